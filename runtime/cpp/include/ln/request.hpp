@@ -1,0 +1,116 @@
+#pragma once
+// What is asked of a Points wire: "what does this surface point make of the illumination on the wire?"
+
+#include "ln/sampling.hpp"
+#include "ln/tracer.hpp"
+
+namespace ln {
+
+/// Dimensions of the random numbers that belong to one vertex of a path. `kOwn` and above are the operators' own.
+enum Dimension : std::uint32_t { kBsdfDirection, kBsdfLobe, kRoulette, kCoverage, kOwn = 8, kPerVertex = 64 };
+
+/// A direction sampled from a BSDF and what the ray found there.
+struct BsdfRay {
+  Ray ray;
+  Hit hit;           // not found: the ray left the scene
+  Color weight{0};   // BSDF * |cos| / density
+  float pdf_w = 0;   // 0: a specular direction
+  Events event = Events::none;
+};
+
+/// A request at a surface point. The receiver scatters what it gets by the events in `kReceives` towards `wo`; answers
+/// are the radiance [W/(m^2 sr)] that leaves towards `wo` because of it. `kSamples` holds the events that the shared
+/// sample may pick: more than `kReceives` where the sample serves somebody else, too (the eye follows S itself).
+template <Events kReceives, Events kSamples = kReceives>
+class Request {
+ public:
+  static constexpr Events receives = kReceives;
+
+  Request(Tracer& tracer, const SampleStream& random, const Interaction& at, const Color& beta, std::uint32_t depth, RayKind kind)
+      : tracer_(tracer), random_(random), at_(at), beta_(beta), depth_(depth), kind_(kind) {}
+
+  Tracer& tracer() { return tracer_; }
+  const SampleStream& random() const { return random_; }
+  const Interaction& at() const { return at_; }
+  /// Number of surfaces between here and the eye.
+  std::uint32_t depth() const { return depth_; }
+  /// Share of the answer that reaches the eye: for decisions (roulette, effort), never for results.
+  const Color& beta() const { return beta_; }
+  /// The point is seen by the eye, directly or by specular surfaces.
+  bool seen() const { return kind_ == RayKind::camera; }
+  /// Random numbers of this vertex for `own` purposes of an operator.
+  std::uint32_t dimension(std::uint32_t own) const { return depth_ * kPerVertex + own; }
+
+  /// Can the receiver scatter samples, i.e. light from directions of the operator's choice?
+  bool takes_samples() const { return any(at_.bsdf.events() & kReceives & Events::DG); }
+
+  /// BSDF times |cos| for light from `wi`.
+  Color f_cos(const Vec3& wi) const {
+    const Vec3 local = at_.frame.to_local(wi);
+    if (!at_.side_agrees(wi, local.z)) return Color(0);
+    return at_.bsdf.f_cos(at_.wo_local, local, kReceives);
+  }
+
+  /// Solid-angle density with which the shared sample picks `wi`.
+  float pdf_w(const Vec3& wi) const { return at_.bsdf.pdf_w(at_.wo_local, at_.frame.to_local(wi), kSamples); }
+
+  /// Radiance that the irradiance `E` [W/m^2] becomes: diffuse reflection only.
+  Color scatter_irradiance(const Color& E) const {
+    if constexpr (!any(kReceives & Events::D)) return Color(0);
+    return at_.bsdf.diffuse_reflectance(at_.wo_local) * E * kInvPi;
+  }
+
+  /// Is the way to an emitter free?
+  bool visible(const LightSample& light, NodeId node) {
+    const Ray ray = std::isfinite(light.distance) ? spawn_ray_to(at_.at, light.position) : spawn_ray(at_.at, light.wi);
+    return !tracer_.occluded(ray, random_.bits(dimension(kCoverage)), node);
+  }
+
+  /// The shared sample, drawn and traced when it is first asked for, at the cost of `node`; null if there is none that
+  /// the receiver can scatter.
+  const BsdfRay* bsdf_ray(NodeId node) {
+    if (!sample() || !any(sample_.event & kReceives)) return nullptr;
+    if (!traced_) {
+      traced_ = true;
+      sample_.hit = tracer_.intersect(sample_.ray, random_.bits(dimension(kCoverage) + 1), node, RayKind::gather);
+    }
+    return &sample_;
+  }
+
+  /// The shared sample without its ray being traced; null: nothing is scattered.
+  const BsdfRay* sample() {
+    if (!sampled_) {
+      sampled_ = true;
+      BsdfSample s;
+      valid_ = at_.bsdf.sample(at_.wo_local, random_.get1(dimension(kBsdfLobe)), random_.get2(dimension(kBsdfDirection)), kSamples,
+                               Carried::radiance, s);
+      if (valid_) {
+        const Vec3 wi = at_.frame.to_world(s.wi);
+        valid_ = at_.side_agrees(wi, s.wi.z);
+        sample_.ray = spawn_ray(at_.at, wi);
+        sample_.weight = s.weight;
+        sample_.pdf_w = s.pdf_w;
+        sample_.event = s.event;
+      }
+    }
+    return valid_ ? &sample_ : nullptr;
+  }
+
+ private:
+  Tracer& tracer_;
+  const SampleStream& random_;
+  const Interaction& at_;
+  Color beta_;
+  std::uint32_t depth_;
+  RayKind kind_;
+  bool sampled_ = false, valid_ = false, traced_ = false;
+  BsdfRay sample_;
+};
+
+/// Weight of a technique of density `a` beside one of density `b` for the same light (power heuristic; Veach 1997, eq. 9.14).
+inline float mis_weight(float a, float b) {
+  const float r = b / a;
+  return 1 / (1 + r * r);
+}
+
+}  // namespace ln

@@ -1,0 +1,109 @@
+#pragma once
+// A scene ready to be rendered: geometry, materials, emitters, tags.
+
+#include <memory>
+#include <span>
+
+#include "ln/accel.hpp"
+#include "ln/bsdf.hpp"
+#include "ln/emitters.hpp"
+#include "ln/scene_data.hpp"
+#include "ln/surface_point.hpp"
+
+namespace ln {
+
+/// A set of the network's tags, one bit each in the order in which the network declares them.
+using TagSet = std::uint64_t;
+inline constexpr TagSet kAnyTag = ~TagSet{0};
+
+/// One `tag name = kind "glob" | ...` of a network.
+struct TagRule {
+  enum class Kind : std::uint8_t { material, mesh, node };
+  int tag;
+  Kind kind;
+  const char* glob;
+};
+
+/// A point of a surface where light is scattered towards `wo`, with its BSDF.
+struct Interaction {
+  SurfacePosition at;
+  Frame frame;              // shading frame; its normal is on the side of wo
+  Vec3 wo{0, 0, 1};         // towards where the light is wanted, world space
+  Vec3 wo_local{0, 0, 1};
+  Bsdf bsdf;
+  Hit hit;
+  std::uint32_t part = 0;
+  bool front = true;        // wo is on the front side
+  Color transmittance{1};   // of the ray that led here, where it ran through an absorbing solid
+
+  /// Do `w` (world space) and its local direction agree about the side of the surface? Shading normals may differ from
+  /// geometric ones; light must not leak through because of it.
+  bool side_agrees(const Vec3& w, float local_z) const { return (glm::dot(w, at.ng) >= 0) == ((local_z >= 0) == front); }
+};
+
+class Scene {
+ public:
+  /// Builds the acceleration structure and everything derived from `data`. Throws Error.
+  Scene(SceneData data, std::span<const TagRule> tags, int threads, const Image* environment);
+
+  const SceneData& data() const { return data_; }
+  const Accel& accel() const { return accel_; }
+  /// All emitters.
+  const Emitters& emitters() const { return *emitters_; }
+  /// The emitters with one of these tags.
+  std::unique_ptr<Emitters> emitters_tagged(TagSet tags) const;
+  /// Bit t is set if the part matches tag t of the network.
+  TagSet part_tags(std::uint32_t part) const { return part_tags_[part]; }
+  /// Number of parts and lights that match tag `t`.
+  int tag_matches(int t) const;
+  /// Events that some surface of the scene can scatter by (conservative: from the ranges of textures).
+  Events events() const { return events_; }
+
+  /// The surface that `ray` hit, seen from where the ray came from.
+  Interaction interaction(const Ray& ray, const Hit& hit) const {
+    Interaction x;
+    x.hit = hit;
+    x.part = data_.triangle_part[hit.triangle];
+    x.wo = -ray.direction;
+    locate(hit, x.at);
+    x.front = glm::dot(x.wo, x.at.ng) >= 0;
+    const Baked& material = baked_[x.part];
+    if (material.plain) {
+      x.bsdf = material.bsdf[x.front ? 0 : 1];
+      x.frame = make_frame(x.front ? x.at.ng : -x.at.ng);
+    } else {
+      shade(x, ray);
+    }
+    x.wo_local = x.frame.to_local(x.wo);
+    return x;
+  }
+
+  /// Position, error bound and geometric normal at a hit.
+  void locate(const Hit& hit, SurfacePosition& at) const {
+    const UVec3 i = data_.triangles[hit.triangle];
+    const Vec3 a = data_.positions[i.x], b = data_.positions[i.y], c = data_.positions[i.z];
+    const Vec3 pa = (1 - hit.u - hit.v) * a, pb = hit.u * b, pc = hit.v * c;
+    at.p = pa + pb + pc;
+    at.p_error = rounding_bound(16) * (glm::abs(pa) + glm::abs(pb) + glm::abs(pc));
+    at.ng = glm::normalize(glm::cross(b - a, c - a));
+  }
+
+ private:
+  /// A part's material where nothing varies over the surface: `plain` surfaces skip all look-ups.
+  struct Baked {
+    bool plain = false;
+    Bsdf bsdf[2];  // seen from the front, from the back
+  };
+
+  void shade(Interaction& x, const Ray& ray) const;
+
+  SceneData data_;
+  Accel accel_;
+  std::vector<Baked> baked_;                                     // by part
+  std::vector<std::unique_ptr<DielectricTable>> dielectrics_;    // by material; null where not needed
+  std::vector<TagSet> part_tags_, light_tags_;
+  std::unique_ptr<Emitters> emitters_;
+  Events events_ = Events::none;
+};
+
+}  // namespace ln

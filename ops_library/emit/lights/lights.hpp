@@ -1,0 +1,29 @@
+#pragma once
+
+#include "ln/operator.hpp"
+
+namespace ln::ops {
+
+/// The emitters of the scene; see lights.ln.
+struct Lights {
+  NodeId node;
+  TagSet from = kAnyTag;
+
+  void prepare(PrepareContext& context) {
+    if (from == kAnyTag) {
+      emitters_ = &context.scene().emitters();
+    } else {
+      owned_ = context.scene().emitters_tagged(from);
+      emitters_ = owned_.get();
+    }
+  }
+
+  /// The Emission wire.
+  const Emitters& emission() const { return *emitters_; }
+
+ private:
+  std::unique_ptr<Emitters> owned_;
+  const Emitters* emitters_ = nullptr;
+};
+
+}  // namespace ln::ops

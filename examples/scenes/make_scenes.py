@@ -128,7 +128,9 @@ def cylinder_figure4() -> GltfWriter:
     walls["left"] = scene.add_lambert("Wall left", (0.6, 0.45, 0.15))
     walls["right"] = scene.add_lambert("Wall right", (0.2, 0.4, 0.55))
     add_room(scene, (-2.5, 0.0, -4.0), (2.5, 3.5, 0.0), walls)
-    scene.add_object("Table", box((1.0, 0.7, 0.8)), white, translation=(-1.55, 0.0, -3.2), rotation=axis_rotation(UP, 25))
+    scene.add_object(
+        "Table", box((1.0, 0.7, 0.8)), white, translation=(-1.55, 0.0, -3.2), rotation=axis_rotation(UP, 25)
+    )
     radius, height = 0.45, 2.3
     # Mirror equation: 1/0.26 + 1/distance = 2/0.45 puts the image about 1.7 m below the vertex.
     mirror = scene.add_mirror("Mirror", (1.0, 1.0, 1.0))
@@ -177,9 +179,7 @@ def add_overhead_camera(scene: GltfWriter) -> None:
 
 def plane_point() -> GltfWriter:
     scene = add_plane("A plane under a point light")
-    scene.add_light(
-        "Point", "point", truth.POINT_INTENSITY, color=truth.POINT_COLOR, position=truth.POINT_POSITION
-    )
+    scene.add_light("Point", "point", truth.POINT_INTENSITY, color=truth.POINT_COLOR, position=truth.POINT_POSITION)
     add_overhead_camera(scene)
     return scene
 
@@ -223,7 +223,12 @@ def glossy_tags() -> GltfWriter:
     scene.add_object("Glass ball", small_sphere, glass, translation=(0.0, 0.4, -0.7), tags=["small"])
     block = scene.add_lambert("Block", (0.25, 0.5, 0.2))
     scene.add_object(
-        "Block", box((0.6, 0.6, 0.6)), block, translation=(-1.6, 0.0, -0.6), rotation=axis_rotation(UP, 30), tags=["small"]
+        "Block",
+        box((0.6, 0.6, 0.6)),
+        block,
+        translation=(-1.6, 0.0, -0.6),
+        rotation=axis_rotation(UP, 30),
+        tags=["small"],
     )
     mirror = scene.add_mirror("Mirror", (1.0, 1.0, 1.0))
     panel = quad((0.0, 0.0, 0.0), (0.9, 0.0, 0.9), (0.0, 1.8, 0.0))
@@ -252,7 +257,9 @@ def many_lights(triangles: int = 300_000, lights: int = 1000) -> GltfWriter:
             f"Lump {i}",
             mesh=lumps[i % len(lumps)],
             translation=(pick.uniform(-7.4, 7.4), scale * pick.uniform(0.7, 3.0), pick.uniform(-11.4, -1.5)),
-            rotation=axis_rotation(normalized((pick.gauss(0, 1), pick.gauss(0, 1), pick.gauss(0, 1))), pick.uniform(0, 360)),
+            rotation=axis_rotation(
+                normalized((pick.gauss(0, 1), pick.gauss(0, 1), pick.gauss(0, 1))), pick.uniform(0, 360)
+            ),
             scale=(scale,) * 3,
         )
     bulb = faceted(octahedron(0.03))

@@ -1,0 +1,1 @@
+"""Tools that compare compiled networks with other programs; they need numpy, and some need Mitsuba 3."""

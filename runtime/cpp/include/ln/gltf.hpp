@@ -2,17 +2,12 @@
 // Reading glTF 2.0.
 
 #include <cstdint>
-#include <stdexcept>
 #include <string>
 
+#include "ln/error.hpp"
 #include "ln/scene_data.hpp"
 
 namespace ln {
-
-/// Something the user can mend: a message that says where, what and how. Reported as one line, exit status 1.
-struct Error : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 struct LoadLimits {
   /// Refuse, before allocating, what would need more memory than this [bytes]; 0: half of the machine's memory.

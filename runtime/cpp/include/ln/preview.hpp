@@ -1,0 +1,14 @@
+#pragma once
+// A small picture for looking at while a render runs.
+
+#include <string>
+
+namespace ln {
+
+class Film;
+
+/// Writes an 8-bit sRGB PNG. Exposure follows the picture (its log-average luminance becomes 18 % grey), highlights are
+/// compressed (Reinhard et al. 2002, "Photographic Tone Reproduction", eq. (4)). Throws Error.
+void write_preview(const std::string& path, const Film& film);
+
+}  // namespace ln

@@ -1,0 +1,99 @@
+#pragma once
+// What a compiled network tells the runtime about itself, and `run_program`, which does everything that all networks share.
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
+
+#include "ln/options.hpp"
+
+namespace ln {
+
+class Film;
+class Progress;
+class Workers;
+struct Stats;
+struct Tile;
+
+/// What a parameter measures. In brackets: the type of the variable behind ParameterSlot::value, and its unit.
+enum class ParameterKind : std::uint8_t {
+  count,   // [std::int64_t]
+  ratio,   // [float, 1]
+  length,  // [float, metres of the scene]
+  angle,   // [float, radians]
+  time,    // [float, seconds]
+  number,  // [float]
+  flag,    // [bool]
+  choice,  // [std::int32_t, index into `choices`]
+  text,    // [std::string]
+};
+
+/// A parameter of a node that can be set when the program starts (--set NODE.PARAMETER=VALUE). On entry the variable behind
+/// `value` holds the default. The range is in the unit of the variable, its ends included.
+struct ParameterSlot {
+  const char* node;
+  const char* name;
+  ParameterKind kind;
+  void* value;
+  double minimum = -std::numeric_limits<double>::infinity();
+  double maximum = std::numeric_limits<double>::infinity();
+  std::span<const char* const> choices = {};
+  const char* summary = "";  // one line for --help
+};
+
+struct NodeInfo {
+  const char* name;
+  const char* op;
+  int line = 0;  // in the .ln file
+};
+
+/// A wire that is written as a layer `name.R`, `name.G`, `name.B` of the picture.
+struct LayerInfo {
+  const char* name;
+  const char* light_paths = "";
+};
+
+struct ProgramInfo {
+  const char* network;
+  const char* source_file;  // the .ln file's name without its folder
+  const char* image_paths;  // light paths of the picture
+  std::span<const ParameterSlot> parameters = {};
+  std::span<const NodeInfo> nodes = {};
+  std::span<const LayerInfo> layers = {};
+};
+
+/// What the parts of a run share.
+struct RunContext {
+  const ProgramInfo& program;
+  const Options& options;
+  Workers& workers;
+  Progress& progress;
+  Stats& stats;
+};
+
+/// The part of a program that depends on the network, called in this order, each once but for render_tile.
+class RunCallbacks {
+ public:
+  virtual ~RunCallbacks() = default;
+
+  /// Reads the scene and chooses the camera. Returns the size of the picture: picture_size(options, camera.aspect).
+  virtual PictureSize load(RunContext& context) = 0;
+  /// Builds what rays and emitters need (Embree, light tree).
+  virtual void build(RunContext& context) = 0;
+  /// Work of the operators before the picture; name each with context.progress.phase("prepare", node).
+  virtual void prepare(RunContext& context) = 0;
+  /// Adds samples [tile.first_sample, tile.first_sample + tile.sample_count) of the tile's pixels to the film; called from
+  /// many threads. What it adds must depend on pixel and sample number only, never on tile, worker or order. It returns early,
+  /// between two samples of a pixel, when tile.stopped().
+  virtual void render_tile(const Tile& tile, Film& film) = 0;
+  /// After the picture is written: wire taps. Called after an interrupt too.
+  virtual void finish(RunContext&) {}
+  /// Fills scene, rays and nodes; seconds, samples and peak_bytes are filled already.
+  virtual void collect(Stats& stats) = 0;
+};
+
+/// Runs the program from the command line to the exit status. Never throws; prints one line if it fails.
+int run_program(int argc, char** argv, const ProgramInfo& program, RunCallbacks& callbacks);
+
+}  // namespace ln

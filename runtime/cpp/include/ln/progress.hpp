@@ -1,0 +1,64 @@
+#pragma once
+// Everything that a program says while it runs, on standard error.
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "ln/options.hpp"
+
+namespace ln {
+
+/// The text with control characters, bidirectional overrides and bytes that are not UTF-8 written as escapes: names from
+/// files cannot steer a terminal. One line stays one line.
+std::string printable(std::string_view text);
+
+/// "note: ..." and "warning: ..." on standard error (a JSON line with --progress json). Safe from any thread; a bar on the
+/// terminal is not torn.
+void note(std::string_view message);
+void warning(std::string_view message);
+
+/// The last line of a program that failed: "network: error: ...".
+void report_error(std::string_view program, std::string_view message);
+
+/// A bar on a terminal, plain lines at most every few seconds elsewhere, JSON lines on request. One at a time.
+class Progress {
+ public:
+  explicit Progress(ProgressMode mode);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// Begins a phase: load, build, prepare (with the node's name as detail), render, write.
+  void phase(std::string_view name, std::string_view detail = {});
+
+  struct State {
+    double fraction = -1;                     // of the phase; below 0: unknown
+    std::optional<std::uint32_t> samples;     // per pixel so far
+    std::optional<double> error;              // estimated relMSE
+  };
+  /// True if it is time for an update; cheap, from any thread.
+  bool due() const;
+  void update(const State& state);
+
+  /// Ends the bar and prints the last line.
+  void finish(std::string_view summary);
+
+ private:
+  void clear_bar();
+  void print_bar(const State& state, double elapsed);
+
+  friend void note(std::string_view);
+  friend void warning(std::string_view);
+  friend void report_error(std::string_view, std::string_view);
+
+  ProgressMode mode_;
+  bool bar_shown_ = false;
+  std::string phase_, detail_;
+  double phase_start_ = 0;
+  std::atomic<double> next_update_{0};
+};
+
+}  // namespace ln

@@ -14,13 +14,13 @@
 
 namespace ln {
 
-/// The triangles of a scene, ready for ray queries. Triangles from `alpha_begin` on belong to parts with partial
-/// coverage (alpha mask or blend): each query decides per surface, by a hash of the ray's key, whether it is there.
+/// The triangles of a scene, ready for ray queries. On triangles of partial coverage (alpha mask or blend) each query
+/// decides, by a hash of the ray's key, whether the surface is there.
 class Accel {
  public:
   Accel() = default;
   /// Throws Error if Embree cannot be set up or runs out of memory. `data` must outlive the object and not move.
-  Accel(SceneData& data, std::uint32_t alpha_begin, int threads);
+  Accel(SceneData& data, int threads);
 
   /// Nearest hit. `key`: decides stochastic coverage; different keys are independent.
   Hit intersect(const Ray& ray, std::uint32_t key) const {

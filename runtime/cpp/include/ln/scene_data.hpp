@@ -112,6 +112,8 @@ struct SceneData {
   std::vector<Vec2> uvs[2];
   std::vector<Vec4> colors;                   // linear; (1, 1, 1, 1) where a part has none
 
+  std::uint32_t alpha_begin = 0;              // triangles from here on have partial coverage (set by Scene, which sorts them so)
+
   std::vector<Part> parts;
   std::vector<Material> materials;            // at least one; glTF's default material is appended where used
   std::vector<Image> images;                  // only those that some used material refers to

@@ -1,8 +1,10 @@
 #pragma once
 // What an operator may use while it prepares.
 
-#include <functional>
+#include <cstdint>
+#include <vector>
 
+#include "ln/parallel.hpp"
 #include "ln/tracer.hpp"
 
 namespace ln {
@@ -10,24 +12,44 @@ namespace ln {
 /// Access to the scene and to all cores, before the picture.
 class PrepareContext {
  public:
-  PrepareContext(const Scene& scene, std::uint64_t seed, int threads, std::size_t node_count)
-      : scene_(&scene), seed_(seed), threads_(threads), counts_(node_count) {}
+  PrepareContext(const Scene& scene, Workers& workers, std::uint64_t seed, std::size_t node_count)
+      : scene_(&scene), workers_(&workers), seed_(seed) {
+    for (int i = 0; i < workers.count(); ++i) tracers_.emplace_back(scene, node_count, 0);
+  }
 
   const Scene& scene() const { return *scene_; }
   std::uint64_t seed() const { return seed_; }
-  int threads() const { return threads_; }
+  Workers& workers() { return *workers_; }
 
-  /// Runs `work(tracer, i)` for i in [0, count), each i once, on all cores. Results must not depend on which thread runs
-  /// what. Stops early, by throwing Interrupted, when the user interrupts.
-  void parallel_for(std::size_t count, const std::function<void(Tracer&, std::size_t)>& work);
+  /// Calls `work(begin, end, tracer)` for each run of `grain` numbers of [0, n), on all cores. Results must not depend on
+  /// which thread does what. Throws Interrupted if the user asked to stop.
+  template <class Work>
+  void for_chunks(std::size_t n, std::size_t grain, Work&& work) {
+    workers_->for_chunks(n, grain, [&](std::size_t begin, std::size_t end, int worker) { work(begin, end, tracers_[worker]); });
+  }
 
-  const std::vector<RayCounts>& counts() const { return counts_; }
+  /// Calls `work(tracer, i)` for each i of [0, n).
+  template <class Work>
+  void parallel_for(std::size_t n, Work&& work) {
+    for_chunks(n, 1, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
+      for (std::size_t i = begin; i < end; ++i) work(tracer, i);
+    });
+  }
+
+  /// Rays cast so far by `node` for `kind`.
+  std::uint64_t rays(NodeId node, RayKind kind) const {
+    std::uint64_t sum = 0;
+    for (const Tracer& tracer : tracers_) sum += tracer.costs()[node].rays[static_cast<int>(kind)];
+    return sum;
+  }
+
+  const std::vector<Tracer>& tracers() const { return tracers_; }
 
  private:
   const Scene* scene_;
+  Workers* workers_;
   std::uint64_t seed_;
-  int threads_;
-  std::vector<RayCounts> counts_;  // rays cast while preparing, by node
+  std::vector<Tracer> tracers_;  // one a worker
 };
 
 }  // namespace ln

@@ -19,7 +19,8 @@ inline constexpr TagSet kAnyTag = ~TagSet{0};
 /// One `tag name = kind "glob" | ...` of a network.
 struct TagRule {
   enum class Kind : std::uint8_t { material, mesh, node };
-  int tag;
+  int tag;           // number of the tag; the rules of one tag stand together
+  const char* name;  // of the tag
   Kind kind;
   const char* glob;
 };

@@ -1,0 +1,152 @@
+#pragma once
+// From a network to a program: what `main` of a generated file calls.
+//
+// A Network is a struct with
+//   void prepare(PrepareStep& step)              work before the picture: step(node id, [&](PrepareContext&) { ... }) each
+//   Color image(Request&) const                  what the eye gets from a surface point; a template
+//   std::span<const ParameterSlot> parameters()  and the other tables of ProgramInfo
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "ln/camera.hpp"
+#include "ln/film.hpp"
+#include "ln/prepare.hpp"
+#include "ln/program.hpp"
+#include "ln/render_passes.hpp"
+#include "ln/request.hpp"
+
+namespace ln {
+
+/// Node 0 of every network: the picture itself. It casts camera rays.
+inline constexpr NodeId kEye = 0;
+
+/// Runs and times the preparation of one node after the other.
+class PrepareStep {
+ public:
+  PrepareStep(PrepareContext& context, RunContext& run, std::vector<double>& seconds) : context_(context), run_(run), seconds_(seconds) {}
+
+  void operator()(NodeId node, FunctionRef<void(PrepareContext&)> work);
+
+ private:
+  PrepareContext& context_;
+  RunContext& run_;
+  std::vector<double>& seconds_;
+};
+
+/// Everything of a run that needs no knowledge of the network's type.
+class NetworkRun : public RunCallbacks {
+ public:
+  NetworkRun(const ProgramInfo& program, std::span<const TagRule> tags) : program_(program), tags_(tags) {}
+
+  PictureSize load(RunContext& context) override;
+  void build(RunContext& context) override;
+  void prepare(RunContext& context) override;
+  void collect(Stats& stats) override;
+
+ protected:
+  virtual void prepare_network(PrepareStep& step) = 0;
+
+  const Scene& scene() const { return *scene_; }
+  const CameraRays& camera() const { return camera_; }
+  Tracer& tracer(int worker) { return tracers_[static_cast<std::size_t>(worker)]; }
+  std::uint32_t seed_hash() const { return seed_hash_; }
+
+ private:
+  const ProgramInfo& program_;
+  std::span<const TagRule> tags_;
+  SceneData data_;  // moved into the scene by `build`
+  Image environment_;
+  bool has_environment_ = false;
+  Camera chosen_camera_;
+  PictureSize size_;
+  std::string scene_file_;
+  CameraRays camera_;
+  std::unique_ptr<Scene> scene_;
+  std::optional<PrepareContext> prepare_context_;
+  std::vector<double> prepare_seconds_;
+  std::vector<Tracer> tracers_;
+  std::uint32_t seed_hash_ = 0;
+};
+
+/// Radiance that arrives at the eye along `ray`: follows specular surfaces (S*), adds the emitters that are seen (L S* E)
+/// and asks the network at every surface on the way.
+template <class Network>
+Color eye_radiance(const Network& network, Tracer& tracer, Ray ray, const SampleStream& random) {
+  const Scene& scene = tracer.scene();
+  Color result(0), beta(1);
+  for (std::uint32_t depth = 0;; ++depth) {
+    const Hit hit = tracer.intersect(ray, random.bits(depth * kPerVertex + kCoverage + 1), kEye, RayKind::camera);
+    if (!hit.found()) {
+      result += beta * scene.emitters().environment(ray.direction);
+      return result;
+    }
+    const Interaction at = scene.interaction(ray, hit);
+    beta *= at.transmittance;
+    result += beta * scene.emitters().radiance(hit, at.wo);
+
+    Request<Events::DG, Events::all> request(tracer, random, at, beta, depth + 1, RayKind::camera);
+    if (any(at.bsdf.events() & Events::DG)) result += beta * network.image(request);
+
+    // Follow a specular direction, if the point's sample is one.
+    if (!any(at.bsdf.events() & Events::S)) return result;
+    const BsdfRay* sample = request.sample();
+    if (!sample || sample->event != Events::S) return result;
+    beta *= sample->weight;
+    ray = sample->ray;
+    constexpr std::uint32_t kRouletteDepth = 16;
+    if (depth >= kRouletteDepth) {
+      const float survival = std::min(max_component(beta), 0.95f);
+      if (random.get1((depth + 1) * kPerVertex + kRoulette) >= survival) return result;
+      beta /= survival;
+    }
+  }
+}
+
+template <class Network>
+class NetworkProgram final : public NetworkRun {
+ public:
+  NetworkProgram(const ProgramInfo& program, std::span<const TagRule> tags, Network& network)
+      : NetworkRun(program, tags), network_(network), layer_count_(program.layers.size()) {}
+
+  void render_tile(const Tile& tile, Film& film) override {
+    Tracer& tracer = this->tracer(tile.worker);
+    for (int y = tile.y0; y < tile.y1; ++y) {
+      for (int x = tile.x0; x < tile.x1; ++x) {
+        if (tile.stopped()) return;
+        const std::uint32_t key = hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)), seed_hash());
+        for (std::uint32_t i = 0; i < tile.sample_count; ++i) render_sample(x, y, key, tile.first_sample + i, tracer, film);
+      }
+    }
+  }
+
+ protected:
+  void prepare_network(PrepareStep& step) override { network_.prepare(step); }
+
+ private:
+  void render_sample(int x, int y, std::uint32_t key, std::uint32_t sample, Tracer& tracer, Film& film) {
+    const SampleStream random(key, sample);
+    const SampleTimer timer(tracer, hash32(key, sample));
+    const Vec2 pixel = Vec2(static_cast<float>(x), static_cast<float>(y)) + random.get2(kPixel);
+    film.add(x, y, sample, eye_radiance(network_, tracer, camera().ray(pixel), random));
+    for (std::size_t layer = 0; layer < layer_count_; ++layer) {
+      film.add_layer(static_cast<int>(layer), x, y, tracer.layers()[layer]);
+      tracer.layers()[layer] = Color(0);
+    }
+  }
+
+  static constexpr std::uint32_t kPixel = kOwn;  // of vertex 0, the eye
+
+  Network& network_;
+  std::size_t layer_count_;
+};
+
+/// The program of a network: from the command line to the exit status.
+template <class Network>
+int run(int argc, char** argv, const ProgramInfo& program, std::span<const TagRule> tags, Network& network) {
+  NetworkProgram<Network> run(program, tags, network);
+  return run_program(argc, argv, program, run);
+}
+
+}  // namespace ln

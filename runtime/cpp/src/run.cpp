@@ -1,0 +1,134 @@
+#include "ln/run.hpp"
+
+#include <cmath>
+
+#include "ln/gltf.hpp"
+#include "ln/image_reader.hpp"
+#include "ln/progress.hpp"
+#include "ln/stats.hpp"
+#include "ln/text.hpp"
+
+namespace ln {
+
+namespace {
+
+/// A camera that frames the whole scene, which normalised coordinates put into the unit ball around the origin.
+Camera framing_camera() {
+  Camera camera;
+  camera.name = "default";
+  camera.yfov = 0.7f;
+  const Vec3 towards = glm::normalize(Vec3(0.5f, 0.35f, 1.0f));
+  camera.position = towards * (1.0f / std::sin(0.5f * camera.yfov));
+  camera.forward = -towards;
+  camera.right = glm::normalize(glm::cross(camera.forward, Vec3(0, 1, 0)));
+  camera.up = glm::cross(camera.right, camera.forward);
+  return camera;
+}
+
+Camera choose_camera(const SceneData& data, const std::string& wanted) {
+  std::string names;
+  for (const Camera& camera : data.cameras) {
+    if (wanted.empty() || camera.name == wanted || camera.node == wanted) return camera;
+    names += (names.empty() ? "" : ", ") + printable(camera.node.empty() ? camera.name : camera.node);
+  }
+  if (!wanted.empty())
+    throw Error("--camera: the scene has no camera '" + printable(wanted) + "'" +
+                (names.empty() ? "; it has none at all" : "; it has: " + names));
+  note("the scene has no camera: using one that frames it");
+  return framing_camera();
+}
+
+bool has_emitter(const SceneData& data) {
+  if (!data.lights.empty()) return true;
+  for (const Part& part : data.parts)
+    if (part.triangle_count > 0 && data.materials[part.material].emits()) return true;
+  return false;
+}
+
+/// The light of a scene without any: a white sky of radiance 1 all around.
+Image default_environment() {
+  Image image;
+  image.width = image.height = 1;
+  image.channels = 3;
+  image.floats = {1, 1, 1};
+  return image;
+}
+
+}  // namespace
+
+void PrepareStep::operator()(NodeId node, FunctionRef<void(PrepareContext&)> work) {
+  run_.progress.phase("prepare", run_.program.nodes[node].name);
+  const Stopwatch watch;
+  work(context_);
+  seconds_[node] += watch.seconds();
+}
+
+PictureSize NetworkRun::load(RunContext& context) {
+  const Options& options = context.options;
+  scene_file_ = options.scene;
+  data_ = load_gltf(options.scene);
+  for (const std::string& text : data_.notes) note(text);
+  if (!options.environment_path.empty()) {
+    environment_ = read_image_file(options.environment_path);
+    has_environment_ = true;
+  } else if (!has_emitter(data_)) {
+    note("the scene has no light: using a white sky of radiance 1");
+    environment_ = default_environment();
+    has_environment_ = true;
+  }
+  chosen_camera_ = choose_camera(data_, options.camera);
+  size_ = picture_size(options, chosen_camera_.aspect);
+  camera_ = CameraRays(chosen_camera_, size_.width, size_.height);
+  return size_;
+}
+
+void NetworkRun::build(RunContext& context) {
+  scene_ = std::make_unique<Scene>(std::move(data_), tags_, context.workers.count(), has_environment_ ? &environment_ : nullptr);
+  for (std::size_t i = 0; i < tags_.size(); ++i) {
+    const int tag = tags_[i].tag;
+    const bool first = i == 0 || tags_[i - 1].tag != tag;
+    if (first && scene_->tag_matches(tag) == 0) warning("LN0501: tag " + std::string(tags_[i].name) + " matches nothing in this scene");
+  }
+  seed_hash_ = hash32(static_cast<std::uint32_t>(context.options.seed), static_cast<std::uint32_t>(context.options.seed >> 32));
+  prepare_context_.emplace(*scene_, context.workers, context.options.seed, program_.nodes.size());
+  prepare_seconds_.assign(program_.nodes.size(), 0);
+  for (int i = 0; i < context.workers.count(); ++i) tracers_.emplace_back(*scene_, program_.nodes.size(), program_.layers.size());
+}
+
+void NetworkRun::prepare(RunContext& context) {
+  PrepareStep step(*prepare_context_, context, prepare_seconds_);
+  prepare_network(step);
+}
+
+void NetworkRun::collect(Stats& stats) {
+  std::vector<NodeCost> costs(program_.nodes.size());
+  const auto add = [&](const std::vector<Tracer>& tracers) {
+    for (const Tracer& tracer : tracers)
+      for (std::size_t i = 0; i < costs.size(); ++i) costs[i] += tracer.costs()[i];
+  };
+  if (prepare_context_) add(prepare_context_->tracers());
+  add(tracers_);
+
+  std::uint64_t ticks = 0;
+  for (const NodeCost& cost : costs) ticks += cost.ticks;
+  for (std::size_t i = 0; i < costs.size(); ++i) {
+    const auto& rays = costs[i].rays;
+    RayCounts sum{rays[0], rays[1], rays[2], rays[3], rays[0] + rays[1] + rays[2] + rays[3]};
+    stats.rays += sum;
+    NodeStats node;
+    node.name = program_.nodes[i].name;
+    node.op = program_.nodes[i].op;
+    node.rays = sum.total;
+    const double share = ticks > 0 ? static_cast<double>(costs[i].ticks) / static_cast<double>(ticks) : 0;
+    node.seconds = (prepare_seconds_.empty() ? 0 : prepare_seconds_[i]) + share * stats.seconds.render;
+    stats.nodes.push_back(std::move(node));
+  }
+  stats.scene_file = scene_file_;
+  if (!scene_) return;
+  const SceneData& data = scene_->data();
+  stats.scene_counts = {{"triangles", data.triangles.size()}, {"vertices", data.positions.size()}, {"parts", data.parts.size()},
+                        {"materials", data.materials.size()}, {"images", data.images.size()},      {"lights", data.lights.size()},
+                        {"cameras", data.cameras.size()},     {"emitters", scene_->emitters().size()}};
+}
+
+}  // namespace ln

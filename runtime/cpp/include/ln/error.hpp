@@ -1,5 +1,5 @@
 #pragma once
-// The one exception type for what the user can mend.
+// How the runtime says that it cannot go on.
 
 #include <stdexcept>
 
@@ -9,5 +9,13 @@ namespace ln {
 struct Error : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+/// Wrong use of the command line. Reported as one line, exit status 2.
+struct UsageError : Error {
+  using Error::Error;
+};
+
+/// Thrown where work stops before there is a picture because the user asked for it (Ctrl-C, SIGTERM). Exit status 130.
+struct Interrupted {};
 
 }  // namespace ln

@@ -11,17 +11,17 @@
 
 namespace ln {
 
-/// The text with control characters, bidirectional overrides and bytes that are not UTF-8 written as escapes: names from
-/// files cannot steer a terminal. One line stays one line.
-std::string printable(std::string_view text);
-
 /// "note: ..." and "warning: ..." on standard error (a JSON line with --progress json). Safe from any thread; a bar on the
-/// terminal is not torn.
+/// terminal is not torn. Control characters, bidirectional overrides and bytes that are not UTF-8 are escaped here, at the last
+/// moment: whatever a file holds, it cannot steer a terminal, and a message stays one line.
 void note(std::string_view message);
 void warning(std::string_view message);
 
 /// The last line of a program that failed: "network: error: ...".
 void report_error(std::string_view program, std::string_view message);
+
+/// Refreshes what the present Progress shows, if it is time for that. Long loops of the calling thread call it (Workers do).
+void progress_heartbeat();
 
 /// A bar on a terminal, plain lines at most every few seconds elsewhere, JSON lines on request. One at a time.
 class Progress {
@@ -48,15 +48,16 @@ class Progress {
 
  private:
   void clear_bar();
-  void print_bar(const State& state, double elapsed);
+  void show(double now);
 
-  friend void note(std::string_view);
-  friend void warning(std::string_view);
-  friend void report_error(std::string_view, std::string_view);
+  enum class Form : std::uint8_t { bar, plain, json, none };
+  friend void say(std::string_view kind, std::string_view message);
+  friend void progress_heartbeat();
 
-  ProgressMode mode_;
+  Form form_;
   bool bar_shown_ = false;
   std::string phase_, detail_;
+  State state_;
   double phase_start_ = 0;
   std::atomic<double> next_update_{0};
 };

@@ -6,21 +6,31 @@
 #include <optional>
 
 #include "ln/film.hpp"
+#include "ln/interrupt.hpp"
 #include "ln/parallel.hpp"
 
 namespace ln {
 
 class Progress;
 
+/// Decides when a pass is given up.
+class PassControl {
+ public:
+  virtual bool stopped() const = 0;
+
+ protected:
+  ~PassControl() = default;
+};
+
 /// A rectangle of pixels [x0, x1) x [y0, y1) and the samples of each of its pixels that are wanted.
 struct Tile {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   std::uint32_t first_sample = 0, sample_count = 0;
   int worker = 0;  // in [0, Workers::count())
-  const std::atomic<bool>* stop = nullptr;
+  const PassControl* control = nullptr;
 
   /// True if the rest of the tile is no longer wanted; ask it once per pixel.
-  bool stopped() const { return stop->load(std::memory_order_relaxed); }
+  bool stopped() const { return interrupt_requested() && control && control->stopped(); }
 };
 
 struct RenderLimits {

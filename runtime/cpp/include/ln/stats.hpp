@@ -57,8 +57,8 @@ double wall_seconds();
 /// Most memory that this process has had resident [bytes].
 std::uint64_t peak_memory_bytes();
 
-/// Memory of the machine [bytes].
-std::uint64_t machine_memory_bytes();
+/// Memory that could be had now without swapping [bytes].
+std::uint64_t available_memory_bytes();
 
 /// Wall time since its making.
 class Stopwatch {

@@ -58,9 +58,10 @@ TagSet tags_of_part(const SceneData& data, const Part& part, std::span<const Tag
   for (const TagRule& rule : rules) {
     bool match = false;
     switch (rule.kind) {
-      case TagRule::Kind::material: match = matches(rule.glob, material.name) || matches_any(rule.glob, material.tags); break;
-      case TagRule::Kind::mesh: match = matches(rule.glob, part.mesh) || matches_any(rule.glob, part.tags); break;
-      case TagRule::Kind::node: match = matches(rule.glob, part.node) || matches_any(rule.glob, part.tags); break;
+      case TagRule::Kind::material: match = matches(rule.glob, material.name); break;
+      case TagRule::Kind::mesh: match = matches(rule.glob, part.mesh); break;
+      case TagRule::Kind::node: match = matches(rule.glob, part.node); break;
+      case TagRule::Kind::extras: match = matches_any(rule.glob, material.tags) || matches_any(rule.glob, part.tags); break;
     }
     if (match) tags |= TagSet{1} << rule.tag;
   }
@@ -70,8 +71,9 @@ TagSet tags_of_part(const SceneData& data, const Part& part, std::span<const Tag
 TagSet tags_of_light(const PunctualLight& light, std::span<const TagRule> rules) {
   TagSet tags = 0;
   for (const TagRule& rule : rules) {
-    if (rule.kind != TagRule::Kind::node) continue;
-    if (matches(rule.glob, light.node) || matches_any(rule.glob, light.tags)) tags |= TagSet{1} << rule.tag;
+    const bool match = (rule.kind == TagRule::Kind::node && matches(rule.glob, light.node)) ||
+                       (rule.kind == TagRule::Kind::extras && matches_any(rule.glob, light.tags));
+    if (match) tags |= TagSet{1} << rule.tag;
   }
   return tags;
 }

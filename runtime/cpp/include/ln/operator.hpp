@@ -15,6 +15,9 @@
 #include "ln/prepare.hpp"
 #include "ln/request.hpp"
 
+/// Marks a function of a pull cycle: it calls itself and is not to be unrolled into itself.
+#define LN_RECURSIVE __attribute__((noinline))
+
 namespace ln {
 
 /// Is the request at a surface with one of the tags `to`?

@@ -18,7 +18,7 @@ inline constexpr TagSet kAnyTag = ~TagSet{0};
 
 /// One `tag name = kind "glob" | ...` of a network.
 struct TagRule {
-  enum class Kind : std::uint8_t { material, mesh, node };
+  enum class Kind : std::uint8_t { material, mesh, node, extras };  // extras: `extras.tags` of any of them
   int tag;           // number of the tag; the rules of one tag stand together
   const char* name;  // of the tag
   Kind kind;

@@ -1,0 +1,1 @@
+"""From a Schedule to the text of a C++ program."""

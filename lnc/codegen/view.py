@@ -1,0 +1,280 @@
+"""A Schedule as plain data for the template: every decision is taken here, the template only loops and substitutes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+
+from lnc.codegen.names import cpp_string, float_literal, unique_names
+from lnc.diagnostics import InternalError
+from lnc.library import snake_case
+from lnc.network import ParameterValue, PathValue, Schedule, ScheduledInput, ScheduledNode, Term
+
+POINTS = "Points"
+
+
+@dataclass(frozen=True)
+class TermView:
+    """A wire in a sum: `factor * pull(request)`; an empty factor is 1."""
+
+    pull: str
+    factor: str
+
+
+@dataclass(frozen=True)
+class InputView:
+    """An argument of an operator: a sum of Points wires, or another node's accessor."""
+
+    terms: tuple[TermView, ...]
+    accessor: str = ""
+
+
+@dataclass(frozen=True)
+class TableView:
+    """A path parameter as a type."""
+
+    type_name: str
+    text: str
+    tags: tuple[str, ...]  # bits of the tags it tells apart
+    next: tuple[tuple[int, ...], ...]
+    accepting: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SlotView:
+    """A parameter that --set can change."""
+
+    node: str
+    name: str
+    kind: str
+    member: str
+    low: str
+    high: str
+    choices: tuple[str, ...]
+    choices_name: str
+    summary: str
+
+
+@dataclass(frozen=True)
+class NodeView:
+    member: str
+    type_name: str
+    pull: str  # empty unless the node's wire is Points
+    constant: str
+    fields: tuple[tuple[str, str], ...]
+    inputs: tuple[InputView, ...]
+    tables: tuple[TableView, ...]
+    head: bool
+    prepares: bool
+    name: str
+    op: str
+    line: int
+    text: str
+    reason: str
+    file: str
+
+
+@dataclass(frozen=True)
+class ResultView:
+    """One value that the picture is made of: evaluated once, counted in the sum or not, shown in layers."""
+
+    terms: tuple[TermView, ...]
+    counted: bool
+    layers: tuple[int, ...]
+    text: str
+
+
+@dataclass(frozen=True)
+class LayerView:
+    name: str
+    light_paths: str
+
+
+@dataclass(frozen=True)
+class TagRuleView:
+    bit: int
+    name: str
+    kind: str
+    glob: str
+
+
+@dataclass(frozen=True)
+class ProgramView:
+    network: str
+    file: str
+    source_lines: tuple[str, ...]
+    headers: tuple[str, ...]
+    nodes: tuple[NodeView, ...]
+    prepare: tuple[NodeView, ...]
+    results: tuple[ResultView, ...]
+    layers: tuple[LayerView, ...]
+    slots: tuple[SlotView, ...]
+    tags: tuple[TagRuleView, ...]
+    image_paths: str
+
+
+def program_view(schedule: Schedule, source: str, image_paths: str, wire_paths: dict[str, str]) -> ProgramView:
+    """The view of a network.
+
+    `source`: its text. `image_paths`: the picture's light paths; `wire_paths`: what the eye sees of each wire.
+    """
+    return _Builder(schedule, wire_paths).build(source, image_paths)
+
+
+class _Builder:
+    def __init__(self, schedule: Schedule, wire_paths: dict[str, str]) -> None:
+        self.schedule = schedule
+        self.wire_paths = wire_paths
+        wires = [n.identifier for n in schedule.nodes]
+        self.members = unique_names(wires)
+        self.pulls = unique_names(wires, "pull_", self.members.values())
+        self.constants = unique_names(wires, "k_", [*self.members.values(), *self.pulls.values()])
+        self.by_name = {n.name: n for n in schedule.nodes}
+        self.tag_bits = {tag.name: i for i, tag in enumerate(schedule.tags)}
+        self.layers: list[LayerView] = []
+
+    def build(self, source: str, image_paths: str) -> ProgramView:
+        nodes = {n.name: self.node(n) for n in self.schedule.nodes}
+        results = self.results()
+        file = PurePath(self.schedule.file).name
+        return ProgramView(
+            network=self.schedule.network,
+            file=file,
+            source_lines=tuple(source.splitlines()),
+            headers=tuple(sorted({_header(n) for n in self.schedule.nodes})),
+            nodes=tuple(nodes.values()),
+            prepare=tuple(nodes[name] for name in self.schedule.prepare),
+            results=results,
+            layers=tuple(self.layers),
+            slots=tuple(slot for n in self.schedule.nodes for slot in self.slots(n)),
+            tags=tuple(
+                TagRuleView(i, tag.name, kind, glob)
+                for i, tag in enumerate(self.schedule.tags)
+                for kind, glob in tag.globs
+            ),
+            image_paths=image_paths,
+        )
+
+    def node(self, n: ScheduledNode) -> NodeView:
+        tables = tuple(self.table(n, p) for p in n.parameters if isinstance(p.value, PathValue))
+        arguments = ", ".join(t.type_name for t in tables)
+        return NodeView(
+            member=self.members[n.identifier],
+            type_name=f"ln::ops::{n.op.name}" + (f"<{arguments}>" if tables else ""),
+            pull=self.pulls[n.identifier] if n.op.output == POINTS else "",
+            constant=self.constants[n.identifier],
+            fields=tuple((p.name, self.field(n, p)) for p in n.parameters if not isinstance(p.value, PathValue)),
+            inputs=tuple(argument for i in n.inputs for argument in self.arguments(i)),
+            tables=tables,
+            head=n.head,
+            prepares=n.prepares,
+            name=n.name,
+            op=n.op.name,
+            line=n.line,
+            text=n.text,
+            reason=n.reason,
+            file=PurePath(n.file).name,
+        )
+
+    def field(self, n: ScheduledNode, p: ParameterValue) -> str:
+        """The C++ initialiser of a parameter."""
+        value = p.value
+        kind = p.declaration.type
+        if kind == "tags":
+            return "ln::kAnyTag" if value is None else f"ln::TagSet{{1}} << {self.tag_bits[str(value)]}"
+        if kind == "text" and p.name == "layer":
+            return str(self.layer(str(value), n.name))
+        if kind == "text":
+            return cpp_string(str(value))
+        if kind == "choice":
+            return str(p.declaration.choices.index(str(value)))
+        if kind == "flag":
+            return "true" if value else "false"
+        if not isinstance(value, int | float):
+            raise InternalError(f"parameter {n.name}.{p.name} has the value {value!r}")
+        return str(int(value)) if kind == "count" else float_literal(value)
+
+    def layer(self, name: str, wire: str) -> int:
+        """Number of the layer called `name`, a new one."""
+        self.layers.append(LayerView(name, self.wire_paths.get(wire, "")))
+        return len(self.layers) - 1
+
+    def table(self, n: ScheduledNode, p: ParameterValue) -> TableView:
+        assert isinstance(p.value, PathValue)
+        events = p.value.events
+        return TableView(
+            type_name=f"{self.members[n.identifier]}_{p.name}",
+            text=p.value.text,
+            tags=tuple(str(self.tag_bits[t]) for t in events.tags),
+            next=events.next,
+            accepting=tuple("true" if a else "false" for a in events.accepting),
+        )
+
+    def arguments(self, i: ScheduledInput) -> list[InputView]:
+        """One argument, or one a term for a variadic port."""
+        if i.port.representation == POINTS:
+            terms = self.terms(i.terms)
+            return [InputView((t,)) for t in terms] if i.port.variadic else [InputView(terms)]
+        if len(i.terms) != 1 or i.terms[0].weight != 1:
+            raise InternalError(f"a sum of {i.port.representation} at port {i.port.name}")
+        source = self.by_name[i.terms[0].node]
+        return [InputView((), f"{self.members[source.identifier]}.{snake_case(i.port.representation)}()")]
+
+    def terms(self, terms: tuple[Term, ...]) -> tuple[TermView, ...]:
+        return tuple(
+            TermView(self.pulls[self.by_name[t.node].identifier], "" if t.weight == 1 else float_literal(t.weight))
+            for t in terms
+        )
+
+    def results(self) -> tuple[ResultView, ...]:
+        """What is evaluated at a surface that the eye sees: the picture's terms, then taps that are not among them."""
+        image = self.schedule.image
+        terms = list(image.terms) if image else []
+        shown: dict[int, list[int]] = {i: [] for i in range(len(terms))}
+        extra: list[ResultView] = []
+        if image and image.layers:
+            for i, term in enumerate(terms):
+                shown[i].append(self.layer(term.node, term.node))
+        for tap in self.schedule.taps:
+            single = tap.terms[0] if len(tap.terms) == 1 else None
+            paths = " | ".join(self.wire_paths.get(t.node, "") for t in tap.terms)
+            self.layers.append(LayerView(Path(tap.file).stem, paths))
+            number = len(self.layers) - 1
+            same = [i for i, t in enumerate(terms) if single and (t.node, t.weight) == (single.node, single.weight)]
+            if same:
+                shown[same[0]].append(number)
+            else:
+                extra.append(ResultView(self.terms(tap.terms), False, (number,), tap.file))
+        counted = [ResultView(self.terms((t,)), True, tuple(shown[i]), t.node) for i, t in enumerate(terms)]
+        return (*counted, *extra)
+
+    def slots(self, n: ScheduledNode) -> list[SlotView]:
+        found = []
+        for p in n.parameters:
+            d = p.declaration
+            if d.type in ("path", "tags") or (d.type == "text" and d.name == "layer"):
+                continue
+            member = self.members[n.identifier]
+            found.append(
+                SlotView(
+                    node=n.name,
+                    name=d.name,
+                    kind=d.type,
+                    member=f"{member}.{d.name}",
+                    low=_bound(d.low, "-"),
+                    high=_bound(d.high, ""),
+                    choices=d.choices if d.type == "choice" else (),
+                    choices_name=f"{member}_{d.name}_choices",
+                    summary=d.doc.strip().split("\n")[0],
+                )
+            )
+        return found
+
+
+def _bound(value: float | None, sign: str) -> str:
+    return f"{sign}std::numeric_limits<double>::infinity()" if value is None else repr(float(value))
+
+
+def _header(n: ScheduledNode) -> str:
+    """The operator's header, relative to its library: family/op/op.hpp."""
+    return "/".join([*PurePath(n.op.folder).parts[-2:], f"{n.op.file_stem}.hpp"])

@@ -1,0 +1,23 @@
+"""Fills the template of a program."""
+
+from __future__ import annotations
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from lnc.codegen.names import comment_text, cpp_string
+from lnc.codegen.view import ProgramView
+
+
+def write_program(view: ProgramView) -> str:
+    """The C++ text of a network's program; the same view gives the same bytes."""
+    environment = Environment(
+        loader=PackageLoader("lnc.codegen", "templates"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    environment.filters["comment"] = comment_text
+    environment.filters["cpp_string"] = cpp_string
+    return environment.get_template("program.cpp.j2").render(view=view)

@@ -4,7 +4,8 @@
 
 #include <numeric>
 
-#include "ln/gltf.hpp"
+#include "ln/dielectric_table.hpp"
+#include "ln/error.hpp"
 #include "ln/material.hpp"
 
 namespace ln {
@@ -105,7 +106,8 @@ Scene::Scene(SceneData data, std::span<const TagRule> tags, int threads, const I
   dielectrics_.resize(data_.materials.size());
   for (std::size_t i = 0; i < data_.materials.size(); ++i) {
     const Material& m = data_.materials[i];
-    if (m.transmission > 0 && !m.unlit && needs_dielectric_table(m.ior, m.roughness, m.metallic_roughness_texture.image >= 0))
+    const bool rough = m.metallic_roughness_texture || sqr(m.roughness) >= kSpecularAlpha;
+    if (m.transmission > 0 && m.solid && m.ior > 0 && rough && !m.unlit)
       dielectrics_[i] = std::make_unique<DielectricTable>(m.ior);
   }
   baked_.resize(data_.parts.size());

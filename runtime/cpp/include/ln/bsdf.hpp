@@ -66,6 +66,9 @@ class Bsdf {
   /// The kinds of lobes that exist, whatever wo.
   Events events() const { return events_; }
 
+  /// Can smooth lobes send light through the surface?
+  bool transmits_smoothly() const { return wall_ != Wall::opaque && rough_ && any(events_ & Events::G); }
+
   /// BSDF times |cos(wi)| of the smooth lobes (D, G) in the mask.
   Color f_cos(const Vec3& wo, const Vec3& wi, Events mask = Events::all, Carried carried = Carried::radiance) const {
     if (kind_ == Kind::lambert) return any(mask & Events::D) && wi.z > 0 ? diffuse_ * wi.z : Color(0);

@@ -44,15 +44,19 @@ class Request {
   /// Can the receiver scatter samples, i.e. light from directions of the operator's choice?
   bool takes_samples() const { return any(at_.bsdf.events() & kReceives & Events::DG); }
 
-  /// BSDF times |cos| for light from `wi`.
-  Color f_cos(const Vec3& wi) const {
+  /// BSDF times |cos| for light from `wi`, and the solid-angle density with which the shared sample picks that direction.
+  BsdfValue evaluate(const Vec3& wi) const {
     const Vec3 local = at_.frame.to_local(wi);
-    if (!at_.side_agrees(wi, local.z)) return Color(0);
-    return at_.bsdf.f_cos(at_.wo_local, local, kReceives);
+    if (!at_.side_agrees(wi, local.z)) return {};
+    static_assert((kReceives & Events::DG) == (kSamples & Events::DG), "the shared sample picks what the receiver scatters");
+    return at_.bsdf.evaluate(at_.wo_local, local, kSamples);
   }
 
-  /// Solid-angle density with which the shared sample picks `wi`.
-  float pdf_w(const Vec3& wi) const { return at_.bsdf.pdf_w(at_.wo_local, at_.frame.to_local(wi), kSamples); }
+  /// The side of the surface from which emitters matter, as a normal; zero: both sides.
+  Vec3 emitter_side() const {
+    if (at_.bsdf.transmits_smoothly()) return Vec3(0);
+    return at_.front ? at_.at.ng : -at_.at.ng;
+  }
 
   /// Radiance that the irradiance `E` [W/m^2] becomes: diffuse reflection only.
   Color scatter_irradiance(const Color& E) const {

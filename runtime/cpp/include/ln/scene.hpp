@@ -6,6 +6,7 @@
 
 #include "ln/accel.hpp"
 #include "ln/bsdf.hpp"
+#include "ln/dielectric_table.hpp"
 #include "ln/emitters.hpp"
 #include "ln/scene_data.hpp"
 #include "ln/surface_point.hpp"

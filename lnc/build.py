@@ -32,6 +32,7 @@ class Runtime:
     """A built runtime library: how to compile and link against it."""
 
     key: str
+    folder: Path  # the CMake build folder; tests build their targets in it, too
     compiler: str
     compile_flags: tuple[str, ...]
     link_flags: tuple[str, ...]
@@ -74,7 +75,6 @@ def build_runtime(options: BuildOptions, quiet: bool = False) -> Runtime:
     ]
     key = _digest(parts)
     folder = _writable_cache() / "runtime" / key
-    flags = folder / "network_flags.txt"
     done = folder / "done"
     if not done.exists():
         folder.mkdir(parents=True, exist_ok=True)
@@ -84,7 +84,7 @@ def build_runtime(options: BuildOptions, quiet: bool = False) -> Runtime:
                     print("lnc: building the runtime library for this machine (once; about two minutes)", flush=True)
                 _cmake(root, folder, options)
                 done.touch()
-    return _read_flags(key, flags)
+    return _read_flags(key, folder)
 
 
 def _cmake(root: Path, folder: Path, options: BuildOptions) -> None:
@@ -132,16 +132,16 @@ def _refuse_bad_output(output: Path) -> None:
         raise BuildError(f"{output}: is a folder; give the program a file name")
 
 
-def _read_flags(key: str, file: Path) -> Runtime:
+def _read_flags(key: str, folder: Path) -> Runtime:
     """Reads what CMake wrote: section names and one flag a line."""
     sections: dict[str, list[str]] = {"compiler": [], "compile": [], "link": []}
     current: list[str] = []
-    for line in file.read_text().splitlines():
+    for line in (folder / "network_flags.txt").read_text().splitlines():
         if line in sections:
             current = sections[line]
         elif line and line != "-I":
             current.append(line)
-    return Runtime(key, sections["compiler"][0], tuple(sections["compile"]), tuple(sections["link"]))
+    return Runtime(key, folder, sections["compiler"][0], tuple(sections["compile"]), tuple(sections["link"]))
 
 
 def _run(command: list[str], what: str) -> None:

@@ -106,7 +106,7 @@ Scene::Scene(SceneData data, std::span<const TagRule> tags, int threads, const I
   dielectrics_.resize(data_.materials.size());
   for (std::size_t i = 0; i < data_.materials.size(); ++i) {
     const Material& m = data_.materials[i];
-    const bool rough = m.metallic_roughness_texture || sqr(m.roughness) >= kSpecularAlpha;
+    const bool rough = m.metallic_roughness_texture || m.roughness >= kMinRoughness;
     if (m.transmission > 0 && m.solid && m.ior > 0 && rough && !m.unlit)
       dielectrics_[i] = std::make_unique<DielectricTable>(m.ior);
   }

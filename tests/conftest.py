@@ -1,0 +1,85 @@
+"""What tests share: compiled networks, runs of them, and the runtime's own tests and tools."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+SCENES = ROOT / "examples" / "scenes"
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished run of a program."""
+
+    status: int
+    stdout: str
+    stderr: str
+    picture: Path
+    stats: dict
+
+
+@pytest.fixture(scope="session")
+def compiled_network(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """compiled_network("direct"): the program of examples/direct.ln; or of a network given as text=..."""
+    folder = tmp_path_factory.mktemp("networks")
+
+    @cache
+    def compiled(name: str, text: str | None = None, ops: Path | None = None) -> Path:
+        source = ROOT / "examples" / f"{name}.ln"
+        if text is not None:
+            source = folder / f"{name}.ln"
+            source.write_text(text)
+        program = folder / name
+        command = [sys.executable, "-m", "lnc", "compile", str(source), "-o", str(program)]
+        if ops is not None:
+            command += ["--ops", str(ops)]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return program
+
+    return compiled
+
+
+@pytest.fixture
+def run_program(tmp_path: Path) -> Callable[..., Run]:
+    """run_program(program, scene, "--samples", "4"): runs it and reads its statistics."""
+
+    def run(program: Path, scene: Path | str, *options: str, timeout: float = 300) -> Run:
+        picture = tmp_path / "out.exr"
+        stats = tmp_path / "stats.json"
+        stats.unlink(missing_ok=True)
+        command = [str(program), str(scene), "-o", str(picture), "--stats", str(stats), "--progress", "none", *options]
+        done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=timeout, check=False)
+        found = json.loads(stats.read_text()) if stats.exists() else {}
+        return Run(done.returncode, done.stdout, done.stderr, picture, found)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def runtime_tool() -> Callable[[str], Path]:
+    """runtime_tool("ln_scene_info"): a developer tool or unit test of the runtime, built."""
+
+    @cache
+    def tool(name: str) -> Path:
+        from lnc.build import BuildOptions, build_runtime
+
+        folder = build_runtime(BuildOptions(), quiet=True).folder
+        for command in (
+            ["cmake", "-S", str(ROOT), "-B", str(folder), "-DLN_TESTS=ON"],
+            ["cmake", "--build", str(folder), "--target", name],
+        ):
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            assert done.returncode == 0, done.stdout + done.stderr
+        return folder / name
+
+    return tool

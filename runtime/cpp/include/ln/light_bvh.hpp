@@ -1,0 +1,71 @@
+#pragma once
+// Importance of many lights for a receiver (Conty & Kulla 2018; Pharr, Jakob & Humphreys, PBR 4th ed., section 12.6.3),
+// with eight children a node: they are compared with each other in one vectorised loop.
+
+#include <vector>
+
+#include "ln/math.hpp"
+
+namespace ln {
+
+/// What bounds the light that one or more finite emitters send out.
+struct LightBounds {
+  Vec3 center{0};
+  float radius = 0;                 // all emitters are within this sphere
+  Vec3 axis{0, 0, 1};               // normals are within theta_o of it, light is within theta_e of a normal
+  float cos_o = 1, cos_e = 0;
+  float phi = 0;                    // sum of radiance * area, or intensity: irradiance * distance^2 facing it
+  bool two_sided = false;
+};
+
+class LightBvh {
+ public:
+  static constexpr int kWidth = 8;
+
+  struct Pick {
+    std::uint32_t index = 0;
+    float pmf = 0;  // 0: no light can contribute
+  };
+  /// Importances of the children of a node.
+  struct Lanes {
+    float importance[kWidth];
+    float total;
+  };
+
+  LightBvh() = default;
+  /// `lights`: phi must be positive. The result depends on nothing else.
+  explicit LightBvh(const std::vector<LightBounds>& lights);
+
+  /// Irradiance that the lights may cause at `p`, roughly, relative to scale(). `n` = 0: any side.
+  Lanes root(const Vec3& p, const Vec3& n) const { return lanes(nodes_[0], p, n); }
+  /// Chooses a light; `root`: of the same receiver.
+  Pick sample(const Lanes& root, const Vec3& p, const Vec3& n, float u) const;
+  /// Probability with which `sample` chooses light `index`.
+  float pmf(const Lanes& root, const Vec3& p, const Vec3& n, std::uint32_t index) const;
+  /// Importances are divided by this.
+  double scale() const { return scale_; }
+
+ private:
+  static constexpr std::uint32_t kLeaf = 0x80000000u;
+
+  struct alignas(32) Node {
+    float cx[kWidth], cy[kWidth], cz[kWidth], r2[kWidth];
+    float ax[kWidth], ay[kWidth], az[kWidth];
+    float cos_o[kWidth], sin_o[kWidth], cos_e[kWidth];
+    float phi[kWidth];         // 0: no child
+    float two_sided[kWidth];   // 1 or -1
+    std::uint32_t child[kWidth];  // a node, or kLeaf | light
+  };
+  struct Slot {
+    std::uint32_t node, lane;
+  };
+
+  static Lanes lanes(const Node& node, const Vec3& p, const Vec3& n);
+
+  std::vector<Node> nodes_;
+  std::vector<std::uint32_t> node_slot_;   // parent * kWidth + lane, by node
+  std::vector<std::uint32_t> light_slot_;  // the same by light
+  double scale_ = 1;
+};
+
+}  // namespace ln

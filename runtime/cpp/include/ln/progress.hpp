@@ -52,6 +52,7 @@ class Progress {
 
   enum class Form : std::uint8_t { bar, plain, json, none };
   friend void say(std::string_view kind, std::string_view message);
+  friend void report_error(std::string_view program, std::string_view message);
   friend void progress_heartbeat();
 
   Form form_;

@@ -34,11 +34,11 @@ struct Direct {
       const Vec2 position = request.random().get2(request.dimension(own(kPosition)), j, n);
       const LightSample s = light.sample(request.at().at, request.emitter_side(), pick, position);
       if (!(s.pdf_w > 0) || is_black(s.radiance)) continue;
-      const Color f = request.f_cos(s.wi);
-      if (is_black(f) || !request.visible(s, node)) continue;
+      const BsdfValue bsdf = request.evaluate(s.wi);
+      if (is_black(bsdf.f_cos) || !request.visible(s, node)) continue;
       const float density = s.pdf_w * static_cast<float>(n);
-      const float weight = s.delta ? 1.0f : mis_weight(density, request.pdf_w(s.wi));
-      sum += f * s.radiance * (weight / density);
+      const float weight = s.delta ? 1.0f : mis_weight(density, bsdf.pdf_w);
+      sum += bsdf.f_cos * s.radiance * (weight / density);
     }
     return sum;
   }

@@ -1,0 +1,3 @@
+"""The compiler of lighting networks: text in, one C++ program out."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,137 @@
+"""The nouns of the operator library, and the questions that passes ask it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from lnc.source import Span
+from lnc.syntax.ast import PathExpression
+
+CONTENTS = ("emission", "irradiance", "samples", "radiance")
+SCATTERED = {"emission": "DGS", "irradiance": "D", "samples": "DG", "radiance": "DGS"}
+PARAMETER_TYPES = ("count", "ratio", "length", "angle", "time", "number", "flag", "choice", "path", "tags", "text")
+
+Scalar = int | float | bool | str
+"""A parameter's value in SI units: metres, radians, seconds; a ratio is a fraction of 1."""
+
+
+@dataclass(frozen=True)
+class Representation:
+    """How illumination is stored on a wire."""
+
+    name: str
+    doc: str
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class Port:
+    """An input. `complete`: must be whole before it is read (pushed); others are pulled on request."""
+
+    name: str
+    representation: str
+    complete: bool
+    variadic: bool
+    doc: str
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A declared parameter. `low` and `high` are in SI units; for a path they bound its number of events.
+
+    `default` is None where the parameter must be given, and for `tags`, where it means "everywhere".
+    """
+
+    name: str
+    type: str
+    choices: tuple[str, ...]
+    default: Scalar | PathExpression | None
+    low: float | None
+    high: float | None
+    doc: str
+    default_text: str = ""
+    span: Span = field(compare=False, repr=False, default=None)  # type: ignore[assignment]
+
+
+@dataclass(frozen=True)
+class PathRule:
+    """One alternative of `paths CONTENT = ...`: the light at a port (or a new `L`), then events.
+
+    `port` is None where the light starts here. `emitter` is "area", "delta", the name of a tags parameter, or None.
+    `tail` holds letters and the names of path parameters; None is the empty path.
+    """
+
+    content: str  # one of CONTENTS, or "unchanged"
+    port: str | None
+    emitter: str | None
+    tail: PathExpression | None
+
+
+@dataclass(frozen=True)
+class Converter:
+    """States that an operator may be inserted automatically."""
+
+    cost: float
+    loss: str
+
+
+@dataclass(frozen=True)
+class Operator:
+    """A LightOp's declaration."""
+
+    name: str
+    family: str
+    folder: str  # absolute path of its folder
+    doc: str
+    ports: tuple[Port, ...]
+    output: str
+    parameters: tuple[Parameter, ...]
+    paths: tuple[PathRule, ...]
+    bias: float
+    converter: Converter | None
+    recursion: str | None  # "roulette" or "depth": bounds a pull recursion through it
+    prepares: bool  # works before the picture: its C++ has a `prepare` function
+    span: Span = field(compare=False, repr=False)
+
+    @property
+    def file_stem(self) -> str:
+        """The name of its folder, header and test."""
+        return snake_case(self.name)
+
+    def port(self, name: str) -> Port | None:
+        return next((p for p in self.ports if p.name == name), None)
+
+    def parameter(self, name: str) -> Parameter | None:
+        return next((p for p in self.parameters if p.name == name), None)
+
+
+@dataclass(frozen=True)
+class Library:
+    """Everything that is declared, by name."""
+
+    operators: dict[str, Operator]
+    representations: dict[str, Representation]
+
+    @cached_property
+    def converters(self) -> dict[str, tuple[Operator, ...]]:
+        """Operators that may be inserted, by the representation that they read, sorted by name."""
+        found: dict[str, list[Operator]] = {}
+        for op in sorted(self.operators.values(), key=lambda o: o.name):
+            if op.converter is not None:
+                found.setdefault(op.ports[0].representation, []).append(op)
+        return {name: tuple(ops) for name, ops in found.items()}
+
+
+def snake_case(name: str) -> str:
+    """`KDPhotonTree` -> `kd_photon_tree`."""
+    out: list[str] = []
+    for i, c in enumerate(name):
+        if c.isupper() and i > 0:
+            after_small = not name[i - 1].isupper()
+            before_small = i + 1 < len(name) and name[i + 1].islower()
+            if (after_small or before_small) and name[i - 1] != "_":
+                out.append("_")
+        out.append(c.lower())
+    return "".join(out)

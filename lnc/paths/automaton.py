@@ -1,0 +1,226 @@
+"""Finite automata over sets of letters.
+
+A letter is a bit of an integer and a transition carries a set of letters, so `D|G|S` is one transition. `determinise`
+first splits the letters into blocks that no transition tells apart, which keeps the work independent of the number of
+tag combinations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+STATE_LIMIT = 4096
+
+
+class TooLarge(Exception):
+    """An automaton would have more than STATE_LIMIT states."""
+
+
+@dataclass
+class Nfa:
+    """A nondeterministic automaton under construction; state 0 is the start."""
+
+    edges: list[list[tuple[int, int]]] = field(default_factory=lambda: [[]])  # state -> (letters, target)
+    silent: list[list[int]] = field(default_factory=lambda: [[]])  # state -> targets reached without a letter
+    accepting: set[int] = field(default_factory=set)
+
+    def state(self) -> int:
+        self.edges.append([])
+        self.silent.append([])
+        return len(self.edges) - 1
+
+    def edge(self, source: int, letters: int, target: int) -> None:
+        if letters:
+            self.edges[source].append((letters, target))
+
+    def skip(self, source: int, target: int) -> None:
+        self.silent[source].append(target)
+
+
+@dataclass(frozen=True)
+class Dfa:
+    """A trimmed, minimal, deterministic automaton; state 0 is the start, and no state is a dead end.
+
+    The empty language is one state that does not accept. `edges[state]` maps targets to letter sets, by target.
+    """
+
+    edges: tuple[tuple[tuple[int, int], ...], ...]  # state -> (letters, target)
+    accepting: tuple[bool, ...]
+
+    @property
+    def is_empty(self) -> bool:
+        return not any(self.accepting)
+
+    @property
+    def accepts_nothing_but_events(self) -> bool:
+        return not self.accepting[0]
+
+    def first_letters(self) -> int:
+        """Every letter with which a word can begin."""
+        letters = 0
+        for mask, _ in self.edges[0]:
+            letters |= mask
+        return letters
+
+    def length_bounds(self) -> tuple[int, int | None]:
+        """The shortest and the longest number of letters in a word; None is unbounded."""
+        depth = {0: 0}
+        queue = [0]
+        for state in queue:
+            for _, target in self.edges[state]:
+                if target not in depth:
+                    depth[target] = depth[state] + 1
+                    queue.append(target)
+        shortest = min((depth[s] for s in depth if self.accepting[s]), default=0)
+        order = _topological(self)
+        if order is None:
+            return shortest, None
+        longest = {s: 0 for s in depth}
+        for state in reversed(order):
+            for _, target in self.edges[state]:
+                longest[state] = max(longest[state], longest[target] + 1)
+        return shortest, longest.get(0, 0)
+
+
+def determinise(nfa: Nfa, limit: int = STATE_LIMIT) -> Dfa:
+    """Subset construction, then minimisation. Raises TooLarge."""
+    blocks = letter_blocks(letters for row in nfa.edges for letters, _ in row)
+    closures: dict[int, frozenset[int]] = {}
+
+    def closure(state: int) -> frozenset[int]:
+        if state not in closures:
+            seen = {state}
+            stack = [state]
+            while stack:
+                for target in nfa.silent[stack.pop()]:
+                    if target not in seen:
+                        seen.add(target)
+                        stack.append(target)
+            closures[state] = frozenset(seen)
+        return closures[state]
+
+    start = closure(0)
+    index: dict[frozenset[int], int] = {start: 0}
+    rows: list[list[int]] = []
+    queue = [start]
+    for subset in queue:
+        row: list[int] = []
+        moves = [edge for state in sorted(subset) for edge in nfa.edges[state]]
+        for block in blocks:
+            reached: set[int] = set()
+            for letters, target in moves:
+                if letters & block:
+                    reached |= closure(target)
+            if not reached:
+                row.append(-1)
+                continue
+            key = frozenset(reached)
+            if key not in index:
+                if len(index) >= limit:
+                    raise TooLarge
+                index[key] = len(queue)
+                queue.append(key)
+            row.append(index[key])
+        rows.append(row)
+    accepting = [any(s in nfa.accepting for s in subset) for subset in queue]
+    return _minimise(rows, accepting, blocks)
+
+
+def letter_blocks(masks: object) -> list[int]:
+    """The coarsest partition of the letters in which every given set is a union of blocks."""
+    blocks: list[int] = []
+    for mask in sorted(set(masks)):  # type: ignore[call-overload]
+        fresh = mask
+        split: list[int] = []
+        for block in blocks:
+            inside = block & mask
+            fresh &= ~block
+            if inside and inside != block:
+                split += [inside, block & ~mask]
+            else:
+                split.append(block)
+        if fresh:
+            split.append(fresh)
+        blocks = split
+    return sorted(blocks)
+
+
+def _minimise(rows: list[list[int]], accepting: list[bool], blocks: list[int]) -> Dfa:
+    """Moore's partition refinement on the states that lead somewhere, renumbered in breadth-first order."""
+    useful = _co_reachable(rows, accepting)
+    if 0 not in useful:
+        return Dfa(((),), (False,))
+    rows = [[t if t in useful else -1 for t in row] for row in rows]
+    part = [int(a) for a in accepting]
+    count = -1
+    while True:
+        signatures: dict[tuple[int, ...], int] = {}
+        fresh = list(part)
+        for state in sorted(useful):
+            signature = (part[state], *(part[t] if t >= 0 else -1 for t in rows[state]))
+            fresh[state] = signatures.setdefault(signature, len(signatures))
+        part = fresh
+        if len(signatures) == count:
+            break
+        count = len(signatures)
+    number: dict[int, int] = {part[0]: 0}
+    queue = [0]
+    edges: list[tuple[tuple[int, int], ...]] = []
+    for state in queue:
+        merged: dict[int, int] = {}
+        for block, target in zip(blocks, rows[state], strict=True):
+            if target < 0:
+                continue
+            if part[target] not in number:
+                number[part[target]] = len(queue)
+                queue.append(target)
+            to = number[part[target]]
+            merged[to] = merged.get(to, 0) | block
+        edges.append(tuple((mask, to) for to, mask in sorted(merged.items())))
+    return Dfa(tuple(edges), tuple(accepting[s] for s in queue))
+
+
+def _co_reachable(rows: list[list[int]], accepting: list[bool]) -> set[int]:
+    """States from which a word can still be accepted."""
+    back: list[list[int]] = [[] for _ in rows]
+    for state, row in enumerate(rows):
+        for target in row:
+            if target >= 0:
+                back[target].append(state)
+    seen = {s for s, a in enumerate(accepting) if a}
+    stack = list(seen)
+    while stack:
+        for source in back[stack.pop()]:
+            if source not in seen:
+                seen.add(source)
+                stack.append(source)
+    return seen
+
+
+def _topological(dfa: Dfa) -> list[int] | None:
+    """States with targets last, or None if there is a cycle."""
+    indegree = [0] * len(dfa.edges)
+    for row in dfa.edges:
+        for _, target in row:
+            indegree[target] += 1
+    ready = [s for s, d in enumerate(indegree) if d == 0]
+    for state in ready:
+        for _, target in dfa.edges[state]:
+            indegree[target] -= 1
+            if indegree[target] == 0:
+                ready.append(target)
+    return ready if len(ready) == len(dfa.edges) else None
+
+
+@dataclass(frozen=True)
+class EventTable:
+    """A path of scattering events as a table for a tracer.
+
+    `tags` are the tags that it tells apart. `next[state][event << len(tags) | mask]` is the next state, or -1 where no
+    accepted path goes on; `event` counts "DGS", and bit i of `mask` is set where the surface has `tags[i]`. The start
+    is state 0. `accepting[state]`: the path may end here.
+    """
+
+    tags: tuple[str, ...]
+    next: tuple[tuple[int, ...], ...]
+    accepting: tuple[bool, ...]

@@ -21,8 +21,8 @@ struct Lights {
   /// The Emission wire.
   const Emitters& emission() const { return *emitters_; }
 
- private:
-  std::unique_ptr<Emitters> owned_;
+  // State.
+  std::unique_ptr<Emitters> owned_ = nullptr;
   const Emitters* emitters_ = nullptr;
 };
 

@@ -1,8 +1,9 @@
 #pragma once
 // What operator headers may use, and what they must offer.
 //
-// An operator is an aggregate: its node first, then its parameters under the names of its declaration. The generated
-// program fills them by name, so a parameter that is missing or misspelt does not compile. Depending on its output:
+// An operator is an aggregate: its node first, then its parameters under the names of its declaration, then what it has
+// prepared (public, with initialisers, names ending in `_`). The generated program fills the parameters by name, so one that
+// is missing or misspelt does not compile. Depending on its output:
 //
 //   Points       template <class Request, class In...> Color answer(Request&, const In&...) const
 //   otherwise    an accessor that its consumers know, e.g. const Emitters& emission() const

@@ -142,15 +142,15 @@ def _item(item: ast.Statement | ast.OperatorItem) -> tuple[str, str, str, tuple[
             text += f" in {low.text}..{high.text}" if low and high else ""
             return text, "", "", ()
         case ast.PathsDeclaration(content, path):
-            return f"paths {content}", f"= {print_path(path)}", "item", ()
+            return f"paths {content}", f"= {print_path(path)}", "paths", ()
         case ast.BiasDeclaration(bound):
-            return "bias", bound.text, "item", ()
+            return "bias", bound.text, "", ()
         case ast.ConverterDeclaration(cost, loss):
-            return "converter", f"cost {cost.text}" + (f" loss {_text(loss)}" if loss else ""), "item", ()
+            return "converter", f"cost {cost.text}" + (f" loss {_text(loss)}" if loss else ""), "", ()
         case ast.RecursionDeclaration(kind):
-            return "recursion", kind, "item", ()
+            return "recursion", kind, "", ()
         case ast.PrepareDeclaration():
-            return "prepare", "", "item", ()
+            return "prepare", "", "", ()
     raise AssertionError(item)
 
 

@@ -1,0 +1,215 @@
+"""Declarations in `.ln` files -> Library. What is wrong in one is reported as LN0112."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from pathlib import Path
+
+from lnc.diagnostics import Diagnostic, Reporter
+from lnc.library import (
+    CONTENTS,
+    PARAMETER_TYPES,
+    Converter,
+    Library,
+    Operator,
+    Parameter,
+    PathRule,
+    Port,
+    Representation,
+    Scalar,
+    snake_case,
+)
+from lnc.locations import cached, compiler_fingerprint, library_folders
+from lnc.source import SourceFile, Span
+from lnc.syntax import ast
+from lnc.syntax.parse import parse
+from lnc.values import UNITS, ValueFault, number
+
+
+def load_library(extra_folders: tuple[str, ...] = ()) -> tuple[Library, list[Diagnostic]]:
+    """The library of all folders, read from the cache if no declaration has changed."""
+    texts: dict[str, str] = {}
+    digest = hashlib.sha256(compiler_fingerprint().encode())
+    for folder in library_folders(extra_folders):
+        for path in sorted(_declarations(folder)):
+            texts[str(path)] = path.read_text("utf-8", errors="replace")
+            digest.update(f"{folder}\0{path}\0{len(texts[str(path)])}\0{texts[str(path)]}".encode())
+    return cached("library", digest.hexdigest(), lambda: read_library(texts))
+
+
+def _declarations(folder: Path) -> list[Path]:
+    found: list[Path] = []
+    for place, folders, files in os.walk(folder):
+        folders[:] = sorted(f for f in folders if not f.startswith((".", "__")))
+        found += [Path(place) / name for name in files if name.endswith(".ln")]
+    return found
+
+
+def read_library(texts: dict[str, str]) -> tuple[Library, list[Diagnostic]]:
+    """All declarations in the given texts, by path. A later operator of the same name replaces an earlier one."""
+    reporter = Reporter()
+    representations: dict[str, Representation] = {}
+    declared: list[tuple[Path, ast.OperatorDeclaration]] = []
+    for path, text in texts.items():
+        file = parse(SourceFile(path, text.replace("\r\n", "\n")), reporter)
+        for statement in file.statements:
+            match statement:
+                case ast.RepresentationDeclaration(name, doc):
+                    representations[name] = Representation(name, doc, statement.span)
+                case ast.OperatorDeclaration():
+                    declared.append((Path(path), statement))
+                case _:
+                    message = "an operator library holds operators and representations only"
+                    reporter.error("LN0112", statement.span, message)
+    operators: dict[str, Operator] = {}
+    for path, declaration in declared:
+        operators[declaration.name] = _OperatorReader(declaration, path, representations, reporter).read()
+    return Library(operators, representations), reporter.sorted()
+
+
+class _OperatorReader:
+    """Reads one declaration."""
+
+    def __init__(
+        self,
+        declaration: ast.OperatorDeclaration,
+        path: Path,
+        representations: dict[str, Representation],
+        reporter: Reporter,
+    ) -> None:
+        self.declaration = declaration
+        self.path = path
+        self.representations = representations
+        self.reporter = reporter
+
+    def read(self) -> Operator:
+        declaration = self.declaration
+        folder = self.path.parent
+        if snake_case(declaration.name) != self.path.stem:
+            self._error(declaration.name_span, f"'{declaration.name}' belongs into {snake_case(declaration.name)}.ln")
+        for name in (declaration.output, *(p.representation for p in declaration.ports)):
+            if name not in self.representations:
+                self._error(declaration.name_span, f"'{declaration.name}' uses '{name}', which no file declares")
+        ports = tuple(
+            Port(p.name, p.representation, p.complete, p.variadic, p.doc, p.span) for p in declaration.ports
+        )
+        body = declaration.body
+        parameters = tuple(self._parameter(i) for i in body if isinstance(i, ast.ParameterDeclaration))
+        converter = next((i for i in body if isinstance(i, ast.ConverterDeclaration)), None)
+        recursion = next((i for i in body if isinstance(i, ast.RecursionDeclaration)), None)
+        if recursion is not None and recursion.kind not in ("roulette", "depth"):
+            self._error(recursion.span, "a recursion is bounded by 'roulette' or by 'depth'")
+        if converter is not None and len(ports) != 1:
+            self._error(converter.span, "a converter has exactly one port")
+        rules = [rule for i in body if isinstance(i, ast.PathsDeclaration) for rule in self._rules(i, ports, parameters)]
+        if not rules:
+            self._error(declaration.name_span, f"'{declaration.name}' does not declare its light paths")
+        return Operator(
+            name=declaration.name,
+            family=folder.parent.name,
+            folder=str(folder),
+            doc=declaration.doc,
+            ports=ports,
+            output=declaration.output,
+            parameters=parameters,
+            paths=tuple(rules),
+            bias=sum(self._number(i.bound, "ratio") for i in body if isinstance(i, ast.BiasDeclaration)),
+            converter=Converter(self._number(converter.cost, "number"), converter.loss) if converter else None,
+            recursion=recursion.kind if recursion else None,
+            prepares=any(p.complete for p in ports) or any(isinstance(i, ast.PrepareDeclaration) for i in body),
+            span=declaration.name_span,
+        )
+
+    def _parameter(self, item: ast.ParameterDeclaration) -> Parameter:
+        if item.type not in PARAMETER_TYPES:
+            self._error(item.span, f"'{item.type}' is no parameter type ({', '.join(PARAMETER_TYPES)})")
+        bounds_type = "count" if item.type == "path" else item.type
+        low = high = None
+        if item.low and item.high:
+            if bounds_type in UNITS:
+                low, high = self._number(item.low, bounds_type), self._number(item.high, bounds_type)
+            else:
+                self._error(item.span, f"a {item.type} has no range")
+        default, text = self._default(item)
+        return Parameter(item.name, item.type, item.choices, default, low, high, item.doc, text, item.span)
+
+    def _default(self, item: ast.ParameterDeclaration) -> tuple[Scalar | ast.PathExpression | None, str]:
+        match item.type, item.default:
+            case _, None:
+                return None, ""
+            case kind, ast.NumberValue(text) if kind in UNITS:
+                return self._number(ast.NumberValue(text, item.span), kind), text
+            case "flag", ast.FlagValue(value):
+                return value, str(value).lower()
+            case "choice", ast.NameValue(name) if name in item.choices:
+                return name, name
+            case "text", ast.TextValue(text):
+                return text, text
+            case "path", ast.PathLiteral(path):
+                return path, path.span.text
+            case "path", ast.NameValue(name) if set(name) <= set("DGS"):
+                events: list[ast.PathExpression] = [ast.PathEvents(c, None, item.span) for c in name]
+                return (ast.PathConcat(tuple(events), item.span) if len(events) > 1 else events[0]), name
+        self._error(item.span, f"the default of '{item.name}' is not a {item.type}")
+        return None, ""
+
+    def _number(self, value: ast.NumberValue, type: str) -> float:
+        try:
+            return number(value.text, type)
+        except ValueFault as fault:
+            self._error(value.span, str(fault))
+            return 0
+
+    # --- paths CONTENT = ... ------------------------------------------------------------------------------------------
+
+    def _rules(
+        self, item: ast.PathsDeclaration, ports: tuple[Port, ...], parameters: tuple[Parameter, ...]
+    ) -> list[PathRule]:
+        """One rule per alternative: a port (or a letter L) at the front, then letters and path parameters."""
+        if item.content not in (*CONTENTS, "unchanged"):
+            self._error(item.span, f"'{item.content}' is no angular content ({', '.join(CONTENTS)} or unchanged)")
+            return []
+        names = {p.name for p in ports}
+        rules: list[PathRule] = []
+        for path in item.path.items if isinstance(item.path, ast.PathUnion) else (item.path,):
+            items = path.items if isinstance(path, ast.PathConcat) else (path,)
+            head, rest = items[0], items[1:]
+            tail: ast.PathExpression | None = None
+            if rest:
+                tail = ast.PathConcat(rest, item.span) if len(rest) > 1 else rest[0]
+            if isinstance(head, ast.PathName) and head.name in names:
+                emitter = head.tag.name if head.tag else None
+                rules.append(PathRule(item.content, head.name, emitter, tail))
+            elif isinstance(head, ast.PathEvents) and head.letters == "L":
+                rules.append(PathRule(item.content, None, head.tag.name if head.tag else None, tail))
+            else:
+                self._error(path.span, "light paths begin with a port or with L")
+            self._check_tail(tail, parameters)
+        return rules
+
+    def _check_tail(self, tail: ast.PathExpression | None, parameters: tuple[Parameter, ...]) -> None:
+        kinds = {p.name: p.type for p in parameters}
+
+        def walk(path: ast.PathExpression) -> None:
+            match path:
+                case ast.PathName(name, tag):
+                    if kinds.get(name) != "path" or (tag and kinds.get(tag.name) != "tags"):
+                        self._error(path.span, f"'{path.span.text}' is no path parameter of this operator")
+                case ast.PathConcat(items) | ast.PathUnion(items):
+                    for part in items:
+                        walk(part)
+                case ast.PathRepeat(part):
+                    walk(part)
+                case ast.PathEvents(_, tag) if tag is not None:
+                    self._error(path.span, "a declaration tags only its parameters: via@from")
+                case ast.PathTagged():
+                    self._error(path.span, "a declaration tags only its parameters: via@from")
+
+        if tail is not None:
+            walk(tail)
+
+    def _error(self, span: Span, message: str) -> None:
+        self.reporter.error("LN0112", span, message)
+
+

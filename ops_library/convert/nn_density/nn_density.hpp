@@ -1,0 +1,33 @@
+#pragma once
+
+#include "ln/operator.hpp"
+#include "ln/photon_density.hpp"
+
+namespace ln::ops {
+
+/// Irradiance from the density of the nearest photons; see nn_density.ln.
+struct NNDensity {
+  NodeId node;
+  std::int64_t neighbours = 60;
+  float radius = 0;         // [m]; 0: automatic
+  std::int32_t kernel = 1;  // choice(constant, cone)
+  TagSet to = kAnyTag;
+
+  void prepare(PrepareContext& context, const PhotonMap& map) {
+    const auto unit = static_cast<float>(context.scene().data().unit);
+    density_ = PhotonDensity(context, map, static_cast<int>(neighbours), radius / unit, static_cast<PhotonKernel>(kernel));
+  }
+
+  template <class Request>
+  Color answer(Request& request, const PhotonMap& map) const {
+    if constexpr (!any(Request::receives & Events::D)) return Color(0);
+    const Interaction& at = request.at();
+    if (map.empty() || !any(at.bsdf.events() & Events::D) || !reaches(request, to)) return Color(0);
+    const Neighbourhood around{at.at.p, at.front ? at.at.ng : -at.at.ng, at.front};
+    return request.scatter_irradiance(density_.irradiance(around));
+  }
+
+  PhotonDensity density_{};  // no parameter
+};
+
+}  // namespace ln::ops

@@ -14,7 +14,8 @@ struct KDPhotonTree {
   /// The PhotonMap wire.
   const PhotonMap& photon_map() const { return map_; }
 
-  PhotonMap map_{};  // no parameter
+  // State.
+  PhotonMap map_{};
 };
 
 }  // namespace ln::ops

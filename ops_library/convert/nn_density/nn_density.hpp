@@ -27,7 +27,8 @@ struct NNDensity {
     return request.scatter_irradiance(density_.irradiance(around));
   }
 
-  PhotonDensity density_{};  // no parameter
+  // State.
+  PhotonDensity density_{};
 };
 
 }  // namespace ln::ops

@@ -21,7 +21,7 @@ struct ParticleTracer {
   /// Where the light of all particles went.
   const PhotonLedger& ledger() const { return photons_.ledger; }
 
-  // Below here is no parameter. (Public, so that the operator stays an aggregate.)
+  // State.
   Photons photons_{};
 };
 

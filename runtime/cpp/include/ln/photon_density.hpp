@@ -1,0 +1,33 @@
+#pragma once
+// Irradiance from the density of photons (Jensen 1996, "Global Illumination using Photon Maps"), without bias at borders.
+
+#include "ln/photon_map.hpp"
+#include "ln/surface_area.hpp"
+
+namespace ln {
+
+class PhotonDensity {
+ public:
+  PhotonDensity() = default;
+  /// `neighbours`: number of photons that an estimate is made of. `radius`: none is taken from farther away [normalised units];
+  /// 0: chosen from the photons. `map` must outlive the object.
+  PhotonDensity(PrepareContext& context, const PhotonMap& map, int neighbours, float radius, PhotonKernel kernel);
+
+  /// Irradiance [W/m^2].
+  Color irradiance(const Neighbourhood& around) const;
+
+  float max_radius() const { return max_radius_; }
+
+  static constexpr int kMaxNeighbours = 4096;
+
+ private:
+  float automatic_radius(PrepareContext& context) const;
+
+  const PhotonMap* map_ = nullptr;
+  SurfaceArea surfaces_;
+  std::size_t neighbours_ = 60;
+  float max_radius_ = 0;
+  PhotonKernel kernel_ = PhotonKernel::cone;
+};
+
+}  // namespace ln

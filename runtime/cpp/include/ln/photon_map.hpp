@@ -1,0 +1,73 @@
+#pragma once
+// Photons in a balanced kd-tree, for the nearest ones around a point.
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "ln/photon_tracer.hpp"
+
+namespace ln {
+
+/// A photon near a point. `slot` is its place in the map.
+struct NearPhoton {
+  float distance2;
+  std::uint32_t slot;
+};
+
+/// Which photons, and which parts of surfaces, tell about the irradiance at a point: those that face the same way, on
+/// the same side of their triangles, and lie in a flat double cone around the tangent plane.
+struct Neighbourhood {
+  static constexpr float kMinCos = 0.9f;    // between geometric normals
+  static constexpr float kMaxSlope = 0.5f;  // height over the tangent plane / distance within it
+
+  Vec3 point{0};
+  Vec3 normal{0, 0, 1};  // geometric, on the side where light is wanted; unit length
+  bool front = true;     // that side is the front
+};
+
+class PhotonMap {
+ public:
+  PhotonMap() = default;
+  PhotonMap(PrepareContext& context, const Photons& photons);
+
+  std::size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+
+  /// Finds the nearest photons of a neighbourhood within sqrt(max_distance2), up to `wanted` of them. `found` has room for
+  /// capacity(wanted). Returns their number; if it is `wanted`, the last is the farthest, the others are in no order.
+  std::size_t nearest(const Neighbourhood& around, float max_distance2, std::size_t wanted, NearPhoton* found) const;
+  static constexpr std::size_t capacity(std::size_t wanted) { return 2 * wanted + kBlock; }
+
+  Vec3 position(std::uint32_t slot) const {
+    const Block& b = blocks_[slot / kBlock];
+    const std::uint32_t i = slot % kBlock;
+    return {b.x[i], b.y[i], b.z[i]};
+  }
+  PackedNormal normal(std::uint32_t slot) const { return PackedNormal(blocks_[slot / kBlock].normal[slot % kBlock]); }
+  Color flux(std::uint32_t slot) const {
+    const Block& b = blocks_[slot / kBlock];
+    const std::uint32_t i = slot % kBlock;
+    return PackedColor(b.flux_low[i], b.flux_high[i]).unpack();
+  }
+
+  static constexpr std::uint32_t kBlock = 8;
+
+ private:
+  /// Photons that are scanned together.
+  struct alignas(32) Block {
+    float x[kBlock], y[kBlock], z[kBlock];
+    std::uint32_t normal[kBlock], flux_low[kBlock], flux_high[kBlock];
+  };
+  struct Node {
+    float split;
+    std::uint32_t axis;
+  };
+  struct Builder;
+
+  std::size_t size_ = 0;
+  std::vector<Block> blocks_;
+  std::vector<Node> nodes_;  // [m]: between blocks m-1 and m; the node of blocks [b, e) is (b + e) / 2
+};
+
+}  // namespace ln

@@ -1,0 +1,57 @@
+#pragma once
+// How much surface lies around a point: what a sum over photons must be divided by.
+
+#include <vector>
+
+#include "ln/photon_map.hpp"
+
+namespace ln {
+
+/// Weight of a photon at distance d of the kernel's radius r: 1, or 1 - d/r.
+enum class PhotonKernel : std::uint8_t { constant, cone };
+
+/// A wall that stands on the surface around a point, as a line in the tangent plane [radii]: what is behind it does not count.
+struct SurfaceBlocker {
+  Vec2 a, b;
+};
+
+/// The surface within a ball around a point.
+struct SurfaceCoverage {
+  static constexpr int kMaxBlockers = 64;
+
+  float area = 0;  // integral of the kernel over the visible surface of the neighbourhood
+  int blockers = 0;
+  SurfaceBlocker blocker[kMaxBlockers];
+  Vec3 s, t;       // axes of the tangent plane, divided by the radius
+
+  /// Is the surface point `p`, at `offset` from the centre, hidden behind a blocker?
+  bool hides(const Vec3& offset) const;
+};
+
+/// The triangles of a scene, sorted in space.
+class SurfaceArea {
+ public:
+  SurfaceArea() = default;
+  SurfaceArea(PrepareContext& context, const SceneData& data);
+
+  /// Measures the surface of a neighbourhood within `radius`. Where more than `kMaxTriangles` are that near, the surface is
+  /// taken to be a full disc.
+  void measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage) const;
+
+  static constexpr int kMaxTriangles = 2048;
+
+ private:
+  static constexpr std::uint32_t kLeaf = 4, kWidth = 8;
+  /// Bounds of 8 neighbours in a level of the tree.
+  struct alignas(32) Boxes {
+    float low[3][kWidth], high[3][kWidth];
+  };
+
+  int collect(const Neighbourhood& around, float radius, std::uint32_t* found) const;
+
+  const SceneData* data_ = nullptr;
+  std::vector<std::uint32_t> triangles_;     // in order of size class and position
+  std::vector<std::vector<Boxes>> levels_;   // [0]: boxes of kLeaf triangles each; the last has one element
+};
+
+}  // namespace ln

@@ -1,0 +1,358 @@
+#include <algorithm>
+#include <array>
+#include <bit>
+
+#include "ln/surface_area.hpp"
+
+namespace ln {
+
+namespace {
+
+// Lengths are in radii of the ball from here on.
+
+/// Directions in which the surface is measured.
+constexpr int kDirections = 32;
+/// Parts of equal area along each direction, for telling what is covered twice.
+constexpr int kRings = 64;
+/// Height over the surface from which it is seen: what stands higher, and not along it, hides what is behind.
+constexpr float kEyeHeight = 0.02f;
+/// A blocker nearer than this is the rounding error of a point that lies at a wall.
+constexpr float kMinBlockerDistance = 1e-3f;
+/// Where less than this share of the surface is visible (grass, leaves), blockers are not considered.
+constexpr float kMinVisibleShare = 0.1f;
+
+struct Directions {
+  alignas(32) float x[kDirections], y[kDirections];
+
+  Directions() {
+    for (int j = 0; j < kDirections; ++j) {
+      const float angle = (static_cast<float>(j) + 0.5f) * (2 * kPi / kDirections);
+      x[j] = std::cos(angle);
+      y[j] = std::sin(angle);
+    }
+  }
+};
+const Directions kDirection;
+
+/// Integral of the kernel over a disc of radius sqrt(q), as a share of pi; q: squared distance.
+template <PhotonKernel kernel>
+float kernel_integral(float q) {
+  return kernel == PhotonKernel::constant ? q : q - (2.0f / 3) * q * std::sqrt(q);
+}
+
+/// A triangle in the frame of the tangent plane: z is the height.
+struct LocalTriangle {
+  Vec3 corner[3];
+};
+
+/// The surface along all directions from the point.
+template <PhotonKernel kernel>
+class Sweep {
+ public:
+  Sweep() { std::fill(reach_, reach_ + kDirections, 1.0f); }
+
+  /// Nothing counts behind the line from a to b.
+  void block(const SurfaceBlocker& line) {
+    const Vec2 along = line.b - line.a;
+    const float c = line.a.x * line.b.y - line.a.y * line.b.x;  // distance of the line * its length
+    if (std::abs(c) < kMinBlockerDistance * glm::length(along)) return;
+    const float orientation = c > 0 ? 1.0f : -1.0f;
+    for (int j = 0; j < kDirections; ++j) {
+      const float dx = kDirection.x[j], dy = kDirection.y[j];
+      const bool between = (line.a.x * dy - line.a.y * dx) * orientation >= 0 && (dx * line.b.y - dy * line.b.x) * orientation >= 0;
+      const float slope = dx * along.y - dy * along.x;
+      const float distance = c / slope;
+      if (between && distance > 0) reach_[j] = std::min(reach_[j], distance * distance);
+    }
+  }
+
+  void ignore_blockers() {
+    std::fill(reach_, reach_ + kDirections, 1.0f);
+    std::fill(covered_, covered_ + kDirections, 0u);
+    sum_ = whole_ = 0;
+  }
+
+  void add(const LocalTriangle& triangle) {
+    // Intersect the triangle with each direction: lower <= distance in the plane <= upper.
+    alignas(32) float lower[kDirections], upper[kDirections];
+    std::fill(lower, lower + kDirections, 0.0f);
+    std::fill(upper, upper + kDirections, 2.0f);
+    for (int e = 0; e < 3; ++e) {
+      const Vec3& a = triangle.corner[e];
+      const Vec3& b = triangle.corner[e == 2 ? 0 : e + 1];
+      const float nx = b.y - a.y, ny = a.x - b.x;  // outwards
+      const float c = a.x * b.y - a.y * b.x;
+      for (int j = 0; j < kDirections; ++j) {
+        const float d = nx * kDirection.x[j] + ny * kDirection.y[j];
+        const float t = c / d;
+        lower[j] = d < 0 ? std::max(lower[j], t) : (d == 0 && c < 0) ? 3.0f : lower[j];
+        upper[j] = d > 0 ? std::min(upper[j], t) : upper[j];
+      }
+    }
+    // Height over the tangent plane: h0 + g * distance, within the neighbourhood's slope.
+    const Vec3 normal = glm::cross(triangle.corner[1] - triangle.corner[0], triangle.corner[2] - triangle.corner[0]);
+    if (!(normal.z > 0)) return;
+    const float h0 = glm::dot(normal, triangle.corner[0]) / normal.z;
+    const float gx = -normal.x / normal.z, gy = -normal.y / normal.z;
+    const float tilt = glm::length(normal) / normal.z;  // area over projected area
+    alignas(32) float from[kDirections], to[kDirections], density[kDirections];
+    bool any = false;
+    for (int j = 0; j < kDirections; ++j) {
+      const float g = gx * kDirection.x[j] + gy * kDirection.y[j];
+      constexpr float kSlope = Neighbourhood::kMaxSlope;
+      const float near = std::max(lower[j], std::max(h0 / (kSlope - g), -h0 / (kSlope + g)));
+      const float far = std::max(near, upper[j]);
+      const float h_near = h0 + g * near, h_far = h0 + g * far;
+      from[j] = near * near + h_near * h_near;
+      to[j] = std::min(far * far + h_far * h_far, 1.0f);
+      any |= to[j] > from[j];
+      // Area element over that of the kernel's distance d: rho drho / (d dd), which is exact on a plane through the point.
+      const float middle = 0.5f * (near + std::min(far, 1.0f)) + 1e-12f;
+      density[j] = tilt * middle / (middle + (h0 + g * middle) * g);
+    }
+    if (!any) return;
+    for (int j = 0; j < kDirections; ++j) {
+      if (!(to[j] > from[j])) continue;
+      // Count what is not covered yet: surfaces may lie on each other.
+      const std::uint64_t rings = mask(to[j]) & ~mask(from[j]);
+      const std::uint64_t fresh = rings & ~covered_[j];
+      covered_[j] |= rings;
+      float share = density[j];
+      if (fresh != rings) share *= static_cast<float>(std::popcount(fresh)) / static_cast<float>(std::popcount(rings));
+      if (share == 0) continue;
+      const float start = kernel_integral<kernel>(from[j]);
+      whole_ += share * (kernel_integral<kernel>(to[j]) - start);
+      const float end = std::min(to[j], reach_[j]);
+      if (end > from[j]) sum_ += share * (kernel_integral<kernel>(end) - start);
+    }
+  }
+
+  /// Integral of the kernel over the surface that is visible, and over all of it.
+  float visible() const { return sum_ * (kPi / kDirections); }
+  float whole() const { return whole_ * (kPi / kDirections); }
+
+ private:
+  /// The rings within the squared distance q.
+  static std::uint64_t mask(float q) {
+    const int rings = static_cast<int>(q * kRings + 0.5f);
+    return rings >= kRings ? ~std::uint64_t{0} : (std::uint64_t{1} << rings) - 1;
+  }
+
+  alignas(32) float reach_[kDirections];  // squared distance up to which the surface is visible
+  std::uint64_t covered_[kDirections] = {};
+  float sum_ = 0, whole_ = 0;
+};
+
+/// Interleaves zeros between the lower 20 bits.
+std::uint64_t spread_bits(std::uint64_t x) {
+  x = (x | x << 32) & 0x001f00000000ffffull;
+  x = (x | x << 16) & 0x001f0000ff0000ffull;
+  x = (x | x << 8) & 0x100f00f00f00f00full;
+  x = (x | x << 4) & 0x10c30c30c30c30c3ull;
+  x = (x | x << 2) & 0x1249249249249249ull;
+  return x;
+}
+
+/// Sorting by this puts triangles of similar size that are near each other together.
+std::uint64_t sorting_key(const Vec3& low, const Vec3& high) {
+  int size_class = 0;
+  for (float size = 0x1p-7f; size_class < 7 && size < max_component(high - low); size *= 2) ++size_class;
+  std::uint64_t key = static_cast<std::uint64_t>(size_class) << 60;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const float c = std::clamp((0.5f * (low[axis] + high[axis]) + 1) * 0x1p19f, 0.0f, 0x1p20f - 1);
+    key |= spread_bits(static_cast<std::uint64_t>(c)) << axis;
+  }
+  return key;
+}
+
+}  // namespace
+
+SurfaceArea::SurfaceArea(PrepareContext& context, const SceneData& data) : data_(&data) {
+  const std::size_t count = data.triangles.size();
+  if (count == 0) return;
+
+  // Sort: pieces in parallel, then merge them pair by pair.
+  struct Key {
+    std::uint64_t key;
+    std::uint32_t triangle;
+    bool operator<(const Key& other) const { return key != other.key ? key < other.key : triangle < other.triangle; }
+  };
+  std::vector<Key> keys(count);
+  const std::size_t piece = std::max<std::size_t>((count + 15) / 16, 4096);
+  context.for_chunks(count, piece, [&](std::size_t begin, std::size_t end, Tracer&) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const UVec3 t = data.triangles[i];
+      const Vec3 a = data.positions[t.x], b = data.positions[t.y], c = data.positions[t.z];
+      keys[i] = {sorting_key(glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c))), static_cast<std::uint32_t>(i)};
+    }
+    std::sort(keys.begin() + static_cast<std::ptrdiff_t>(begin), keys.begin() + static_cast<std::ptrdiff_t>(end));
+  });
+  for (std::size_t width = piece; width < count; width *= 2) {
+    context.parallel_for((count - 1) / (2 * width) + 1, [&](Tracer&, std::size_t i) {
+      const auto at = [&](std::size_t k) { return keys.begin() + static_cast<std::ptrdiff_t>(std::min(k, count)); };
+      std::inplace_merge(at(2 * i * width), at((2 * i + 1) * width), at((2 * i + 2) * width));
+    });
+  }
+  triangles_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) triangles_[i] = keys[i].triangle;
+
+  // Bound groups of triangles, then groups of groups.
+  const auto empty_boxes = [] {
+    Boxes boxes;
+    std::fill(&boxes.low[0][0], &boxes.low[0][0] + 3 * kWidth, kInfinity);
+    std::fill(&boxes.high[0][0], &boxes.high[0][0] + 3 * kWidth, -kInfinity);
+    return boxes;
+  };
+  const auto include = [](Boxes& boxes, std::size_t lane, const Vec3& low, const Vec3& high) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      boxes.low[axis][lane] = std::min(boxes.low[axis][lane], low[axis]);
+      boxes.high[axis][lane] = std::max(boxes.high[axis][lane], high[axis]);
+    }
+  };
+  std::vector<Boxes> lowest((count - 1) / (kLeaf * kWidth) + 1, empty_boxes());
+  for (std::size_t i = 0; i < count; ++i) {
+    const UVec3 t = data.triangles[triangles_[i]];
+    const Vec3 a = data.positions[t.x], b = data.positions[t.y], c = data.positions[t.z];
+    include(lowest[i / (kLeaf * kWidth)], i / kLeaf % kWidth, glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c)));
+  }
+  levels_.push_back(std::move(lowest));
+  while (levels_.back().size() > 1) {
+    const std::vector<Boxes>& below = levels_.back();
+    std::vector<Boxes> above((below.size() - 1) / kWidth + 1, empty_boxes());
+    for (std::size_t i = 0; i < below.size(); ++i) {
+      for (std::size_t lane = 0; lane < kWidth; ++lane) {
+        const Boxes& b = below[i];
+        include(above[i / kWidth], i % kWidth, Vec3(b.low[0][lane], b.low[1][lane], b.low[2][lane]),
+                Vec3(b.high[0][lane], b.high[1][lane], b.high[2][lane]));
+      }
+    }
+    levels_.push_back(std::move(above));
+  }
+}
+
+int SurfaceArea::collect(const Neighbourhood& around, float radius, std::uint32_t* found) const {
+  struct Pending {
+    std::uint32_t level, index;
+  };
+  Pending stack[16 * kWidth];
+  int depth = 0, count = 0;
+  stack[depth++] = {static_cast<std::uint32_t>(levels_.size() - 1), 0};
+  const float limit = radius * radius;
+  const Vec3 p = around.point;
+  while (depth > 0) {
+    const Pending at = stack[--depth];
+    const Boxes& boxes = levels_[at.level][at.index];
+    float distance2[kWidth];
+    for (std::uint32_t i = 0; i < kWidth; ++i) {
+      const float x = std::max(std::max(boxes.low[0][i] - p.x, p.x - boxes.high[0][i]), 0.0f);
+      const float y = std::max(std::max(boxes.low[1][i] - p.y, p.y - boxes.high[1][i]), 0.0f);
+      const float z = std::max(std::max(boxes.low[2][i] - p.z, p.z - boxes.high[2][i]), 0.0f);
+      distance2[i] = x * x + y * y + z * z;
+    }
+    for (std::uint32_t i = 0; i < kWidth; ++i) {
+      if (!(distance2[i] <= limit)) continue;
+      const std::uint32_t child = at.index * kWidth + i;
+      if (at.level > 0) {
+        stack[depth++] = {at.level - 1, child};
+        continue;
+      }
+      const std::uint32_t first = child * kLeaf, last = std::min(first + kLeaf, static_cast<std::uint32_t>(triangles_.size()));
+      if (count + static_cast<int>(last - first) > kMaxTriangles) return -1;
+      for (std::uint32_t k = first; k < last; ++k) found[count++] = triangles_[k];
+    }
+  }
+  return count;
+}
+
+namespace {
+
+/// The line in which a triangle crosses the height at which the surface is seen; false: it does not.
+bool crossing(const LocalTriangle& triangle, SurfaceBlocker& line) {
+  Vec2 ends[2];
+  int count = 0;
+  for (int e = 0; e < 3 && count < 2; ++e) {
+    const Vec3& a = triangle.corner[e];
+    const Vec3& b = triangle.corner[e == 2 ? 0 : e + 1];
+    const float ha = a.z - kEyeHeight, hb = b.z - kEyeHeight;
+    if ((ha < 0) == (hb < 0)) continue;
+    ends[count++] = Vec2(a) + (Vec2(b) - Vec2(a)) * (ha / (ha - hb));
+  }
+  if (count < 2) return false;
+  line = {ends[0], ends[1]};
+  return true;
+}
+
+template <PhotonKernel kernel>
+void measure_with(const SceneData& data, const Neighbourhood& around, float radius, const std::uint32_t* found, int count,
+                  SurfaceCoverage& coverage) {
+  const Frame frame = make_frame(around.normal);
+  const float side = around.front ? 1.0f : -1.0f;
+  const float scale = 1 / radius;
+  coverage.s = frame.s * scale;
+  coverage.t = frame.t * scale;
+  coverage.blockers = 0;
+
+  Sweep<kernel> sweep;
+  LocalTriangle facing[SurfaceArea::kMaxTriangles];
+  int facing_count = 0;
+  for (int i = 0; i < count; ++i) {
+    const UVec3 t = data.triangles[found[i]];
+    const Vec3 a = data.positions[t.x] - around.point, b = data.positions[t.y] - around.point, c = data.positions[t.z] - around.point;
+    const Vec3 normal = glm::cross(b - a, c - a);
+    const float agreement = glm::dot(normal, around.normal) * side;
+    const float ha = glm::dot(a, around.normal) * scale, hb = glm::dot(b, around.normal) * scale, hc = glm::dot(c, around.normal) * scale;
+    const LocalTriangle local{{{glm::dot(a, coverage.s), glm::dot(a, coverage.t), ha},
+                               {glm::dot(b, coverage.s), glm::dot(b, coverage.t), hb},
+                               {glm::dot(c, coverage.s), glm::dot(c, coverage.t), hc}}};
+    if (agreement > 0 && agreement * agreement > Neighbourhood::kMinCos * Neighbourhood::kMinCos * glm::dot(normal, normal)) {
+      facing[facing_count] = local;
+      if (!around.front) std::swap(facing[facing_count].corner[1], facing[facing_count].corner[2]);  // seen from behind
+      ++facing_count;
+    } else if (coverage.blockers < SurfaceCoverage::kMaxBlockers && crossing(local, coverage.blocker[coverage.blockers])) {
+      const SurfaceBlocker& line = coverage.blocker[coverage.blockers];
+      const Vec2 along = line.b - line.a;
+      const float c0 = std::abs(line.a.x * line.b.y - line.a.y * line.b.x), length = glm::length(along);
+      if (c0 < length && c0 >= kMinBlockerDistance * length) {
+        sweep.block(line);
+        ++coverage.blockers;
+      }
+    }
+  }
+  for (int i = 0; i < facing_count; ++i) sweep.add(facing[i]);
+  coverage.area = sweep.visible() * radius * radius;
+  if (sweep.visible() < kMinVisibleShare * sweep.whole()) {
+    coverage.area = sweep.whole() * radius * radius;
+    coverage.blockers = 0;
+  }
+}
+
+}  // namespace
+
+bool SurfaceCoverage::hides(const Vec3& offset) const {
+  const Vec2 p(glm::dot(offset, s), glm::dot(offset, t));
+  for (int i = 0; i < blockers; ++i) {
+    const Vec2 a = blocker[i].a, b = blocker[i].b;
+    const float c = a.x * b.y - a.y * b.x;
+    const float from_a = a.x * p.y - a.y * p.x, to_b = p.x * b.y - p.y * b.x;
+    // Between the rays to both ends, and beyond the line (by more than rounding).
+    const float beyond = (p.x * (b.y - a.y) - p.y * (b.x - a.x)) - c;
+    if (c > 0 ? from_a >= 0 && to_b >= 0 && beyond > 1e-4f * c : from_a <= 0 && to_b <= 0 && beyond < 1e-4f * c) return true;
+  }
+  return false;
+}
+
+void SurfaceArea::measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage) const {
+  std::uint32_t found[kMaxTriangles];
+  const int count = collect(around, radius, found);
+  if (count < 0) {
+    coverage.area = (kernel == PhotonKernel::constant ? kPi : kPi / 3) * radius * radius;
+    coverage.blockers = 0;
+    return;
+  }
+  if (kernel == PhotonKernel::constant)
+    measure_with<PhotonKernel::constant>(*data_, around, radius, found, count, coverage);
+  else
+    measure_with<PhotonKernel::cone>(*data_, around, radius, found, count, coverage);
+}
+
+}  // namespace ln

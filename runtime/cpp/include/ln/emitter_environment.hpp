@@ -36,15 +36,15 @@ class Environment {
  private:
   Color interpolated(const Vec3& w) const;
   Color texel(int x, int y) const;
-  int row_of(float y) const;
-  float cell_solid_angle(int row) const;
+  /// Where direction `w` is in the picture, in pixels.
+  Vec2 picture_position(const Vec3& w) const;
 
   const Image* image_;
   bool constant_ = false;
   Color mean_{0};
-  std::vector<float> row_y_;            // height + 1 bounds of the rows as y = cos(theta), falling from 1 to -1
+  std::vector<float> pixel_solid_angle_;  // by row
   Distribution rows_;
-  std::vector<Distribution> columns_;   // of each row
+  std::vector<Distribution> columns_;     // by row
 };
 
 }  // namespace ln

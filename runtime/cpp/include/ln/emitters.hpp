@@ -65,11 +65,11 @@ class Emitters {
   LightSample sample(const SurfacePosition& at, const Vec3& n, float u_pick, const Vec2& u) const;
 
   /// Density [1/sr] with which `sample` at (`at`, `n`) finds the point that a ray from `at` along `wi` has hit; 0 for what
-  /// is not an emitter of this set, or shows its dark side.
-  float pdf_w(const SurfacePosition& at, const Vec3& n, const Hit& hit, const Vec3& wi) const {
+  /// is not an emitter of this set, or shows its dark side. It does not depend on where on the light the point is.
+  float pdf_w(const SurfacePosition& at, const Vec3& n, const Hit& hit, const Vec3& /*wi*/) const {
     if (!has_surfaces_) return 0;
     const Surface& surface = surfaces_[scene_->triangle_part[hit.triangle]];
-    return surface.emits ? surface_pdf_w(surface, at, n, hit, wi) : 0.0f;
+    return surface.emits ? surface_pdf_w(surface, at, n, hit) : 0.0f;
   }
 
   /// Radiance [W/(m^2 sr)] that the surface emits at `hit` towards `w_out`.
@@ -107,6 +107,7 @@ class Emitters {
   struct Choice {
     LightBvh::Lanes root;
     float finite = 0, distant = 0, environment = 0;  // probabilities; all 0: no light can be found
+    float distant_importance = 0;                    // sum over the distant lights
   };
 
   template <class PartPredicate, class LightPredicate>
@@ -125,13 +126,15 @@ class Emitters {
   std::size_t finite_count() const { return area_.size() + punctual_.size(); }
   Choice choose(const Vec3& p, const Vec3& n) const;
   float distant_importance(const DistantLight& light, const Vec3& n) const;
-  float finite_pmf(const Vec3& p, const Vec3& n, std::uint32_t index) const;
   LightSample sample_finite(const SurfacePosition& at, std::uint32_t index, float pmf, const Vec2& u) const;
   LightSample sample_distant(const Vec3& n, float u, float pmf, float total) const;
 
-  float surface_pdf_w(const Surface& surface, const SurfacePosition& at, const Vec3& n, const Hit& hit, const Vec3& wi) const;
+  LightSample sample_environment(const Vec3& n, float pmf, const Vec2& u) const;
+
+  float surface_pdf_w(const Surface& surface, const SurfacePosition& at, const Vec3& n, const Hit& hit) const;
   Color surface_radiance(const Surface& surface, const Hit& hit, const Vec3& w_out) const;
-  Color textured_radiance(std::uint32_t triangle, float u, float v) const;
+  Color varying_radiance(std::uint32_t triangle, float u, float v) const;
+  Color mean_radiance(std::uint32_t triangle) const;
 
   const SceneData* scene_;
   bool has_surfaces_ = false;

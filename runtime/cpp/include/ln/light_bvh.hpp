@@ -14,7 +14,7 @@ struct LightBounds {
   float radius = 0;                 // all emitters are within this sphere
   Vec3 axis{0, 0, 1};               // normals are within theta_o of it, light is within theta_e of a normal
   float cos_o = 1, cos_e = 0;
-  float phi = 0;                    // sum of radiance * area, or intensity: irradiance * distance^2 facing it
+  double phi = 0;                   // sum of radiance * area, or intensity: irradiance * distance^2 facing it
   bool two_sided = false;
 };
 
@@ -48,16 +48,13 @@ class LightBvh {
  private:
   static constexpr std::uint32_t kLeaf = 0x80000000u;
 
-  struct alignas(32) Node {
+  struct alignas(64) Node {
     float cx[kWidth], cy[kWidth], cz[kWidth], r2[kWidth];
     float ax[kWidth], ay[kWidth], az[kWidth];
     float cos_o[kWidth], sin_o[kWidth], cos_e[kWidth];
     float phi[kWidth];         // 0: no child
     float two_sided[kWidth];   // 1 or -1
     std::uint32_t child[kWidth];  // a node, or kLeaf | light
-  };
-  struct Slot {
-    std::uint32_t node, lane;
   };
 
   static Lanes lanes(const Node& node, const Vec3& p, const Vec3& n);

@@ -1,0 +1,296 @@
+#include "ln/light_bvh.hpp"
+
+#include <numeric>
+
+namespace ln {
+
+namespace {
+
+struct Box {
+  Vec3 low{kInfinity}, high{-kInfinity};
+
+  void add(const Vec3& p) { low = glm::min(low, p), high = glm::max(high, p); }
+  void add(const Box& b) { low = glm::min(low, b.low), high = glm::max(high, b.high); }
+  float diagonal2() const { return low.x <= high.x ? glm::dot(high - low, high - low) : 0.0f; }
+};
+
+/// What the cost of a set of lights is estimated from.
+struct Summary {
+  Box box;
+  double phi = 0;
+  Vec3 axes{0};  // sum of axes by power, shortened by their own spread
+  std::uint32_t count = 0;
+
+  void add(const Summary& s) {
+    box.add(s.box);
+    phi += s.phi;
+    axes += s.axes;
+    count += s.count;
+  }
+
+  /// Power times spread in space times spread in direction (Conty & Kulla 2018, eq. 1 and 2).
+  double cost() const {
+    if (count == 0 || phi <= 0) return 0;
+    // Normals spread evenly over a cap of angle theta_o have a mean of length (1 + cos(theta_o)) / 2.
+    const float cos_o = std::clamp(2 * glm::length(axes) / static_cast<float>(phi) - 1, -1.0f, 1.0f);
+    const float theta_o = std::acos(cos_o), sin_o = safe_sqrt(1 - cos_o * cos_o);
+    const float theta_w = std::min(theta_o + 0.5f * kPi, kPi);
+    const float spread = 2 * kPi * (1 - cos_o) +
+                         0.5f * kPi * (2 * theta_w * sin_o - std::cos(theta_o - 2 * theta_w) - 2 * theta_o * sin_o + cos_o);
+    return phi * spread * box.diagonal2();
+  }
+};
+
+class Builder {
+ public:
+  explicit Builder(const std::vector<LightBounds>& lights, double scale) : lights_(lights), order_(lights.size()), summaries_(lights.size()) {
+    std::iota(order_.begin(), order_.end(), 0u);
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+      const LightBounds& l = lights[i];
+      Summary& s = summaries_[i];
+      s.box.add(l.center - l.radius);
+      s.box.add(l.center + l.radius);
+      s.phi = l.phi / scale;
+      s.axes = 0.5f * (1 + l.cos_o) * static_cast<float>(s.phi) * l.axis;
+      // The two faces of a light have no common direction; compare them by one of the two.
+      if (l.two_sided && (l.axis.z < 0 || (l.axis.z == 0 && (l.axis.y < 0 || (l.axis.y == 0 && l.axis.x < 0))))) s.axes = -s.axes;
+      s.count = 1;
+    }
+  }
+
+  struct Range {
+    std::uint32_t begin, end;
+    double cost;
+  };
+
+  std::uint32_t light(std::uint32_t position) const { return order_[position]; }
+
+  Range range(std::uint32_t begin, std::uint32_t end) const {
+    Summary all;
+    for (std::uint32_t i = begin; i < end; ++i) all.add(summaries_[order_[i]]);
+    return {begin, end, all.cost()};
+  }
+
+  /// Divides a range into at most LightBvh::kWidth, always the costliest first.
+  std::vector<Range> divide(std::uint32_t begin, std::uint32_t end, bool by_median) {
+    std::vector<Range> parts{range(begin, end)};
+    while (parts.size() < LightBvh::kWidth) {
+      std::size_t best = parts.size();
+      for (std::size_t i = 0; i < parts.size(); ++i) {
+        const auto count = [&](std::size_t k) { return parts[k].end - parts[k].begin; };
+        if (count(i) < 2) continue;
+        if (best == parts.size() || parts[i].cost > parts[best].cost || (parts[i].cost == parts[best].cost && count(i) > count(best))) best = i;
+      }
+      if (best == parts.size()) break;
+      const Range whole = parts[best];
+      const std::uint32_t middle = by_median ? (whole.begin + whole.end) / 2 : split(whole.begin, whole.end);
+      parts[best] = range(whole.begin, middle);
+      parts.insert(parts.begin() + static_cast<std::ptrdiff_t>(best) + 1, range(middle, whole.end));
+    }
+    return parts;
+  }
+
+  /// Bounds of all lights of a range, conservative.
+  LightBounds bounds(std::uint32_t begin, std::uint32_t end) const {
+    if (end - begin == 1) return lights_[order_[begin]];
+    LightBounds result;
+    Box box;
+    Vec3 axes(0);
+    result.cos_e = 1;
+    for (std::uint32_t i = begin; i < end; ++i) {
+      const LightBounds& l = lights_[order_[i]];
+      const Summary& s = summaries_[order_[i]];
+      box.add(s.box);
+      axes += s.axes;
+      result.phi += l.phi;
+      result.two_sided |= l.two_sided;
+      result.cos_e = std::min(result.cos_e, l.cos_e);
+    }
+    result.center = 0.5f * (box.low + box.high);
+    const float length = glm::length(axes);
+    result.axis = length > 0 ? axes / length : Vec3(0, 0, 1);
+    float theta_o = 0;
+    for (std::uint32_t i = begin; i < end; ++i) {
+      const LightBounds& l = lights_[order_[i]];
+      result.radius = std::max(result.radius, glm::distance(result.center, l.center) + l.radius);
+      float cosine = glm::dot(result.axis, l.axis);
+      if (result.two_sided) cosine = std::abs(cosine);
+      theta_o = std::max(theta_o, std::acos(std::clamp(cosine, -1.0f, 1.0f)) + std::acos(std::clamp(l.cos_o, -1.0f, 1.0f)));
+    }
+    result.radius *= 1 + 0x1p-18f;
+    result.cos_o = std::cos(std::min(theta_o + 1e-4f, kPi));
+    return result;
+  }
+
+ private:
+  /// Where to divide a range in two: the cheapest of the bounds between bins along the three axes; reorders the range.
+  std::uint32_t split(std::uint32_t begin, std::uint32_t end) {
+    constexpr int kBins = 12;
+    const std::uint32_t half = (begin + end) / 2;
+    if (end - begin == 2) return half;
+    Box centers, box;
+    for (std::uint32_t i = begin; i < end; ++i) {
+      centers.add(lights_[order_[i]].center);
+      box.add(summaries_[order_[i]].box);
+    }
+    const Vec3 extent = box.high - box.low;
+    const float longest = max_component(extent);
+    double best_cost = std::numeric_limits<double>::infinity();
+    int best_axis = -1, best_bin = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float low = centers.low[axis], width = centers.high[axis] - low;
+      if (!(width > 0)) continue;
+      Summary bins[kBins];
+      for (std::uint32_t i = begin; i < end; ++i) bins[bin(order_[i], axis, low, width, kBins)].add(summaries_[order_[i]]);
+      // Charge thin slices for being long in the other directions.
+      const double regularity = longest / std::max(extent[axis], longest * 1e-6f);
+      Summary upper[kBins];
+      for (int b = kBins - 1; b > 0; --b) {
+        upper[b] = b + 1 < kBins ? upper[b + 1] : Summary{};
+        upper[b].add(bins[b]);
+      }
+      Summary lower;
+      for (int b = 0; b + 1 < kBins; ++b) {
+        lower.add(bins[b]);
+        if (lower.count == 0 || upper[b + 1].count == 0) continue;
+        const double cost = regularity * (lower.cost() + upper[b + 1].cost());
+        if (cost < best_cost) best_cost = cost, best_axis = axis, best_bin = b;
+      }
+    }
+    if (best_axis < 0) return half;
+    const float low = centers.low[best_axis], width = centers.high[best_axis] - low;
+    const auto middle = std::stable_partition(order_.begin() + begin, order_.begin() + end,
+                                              [&](std::uint32_t i) { return bin(i, best_axis, low, width, kBins) <= best_bin; });
+    return static_cast<std::uint32_t>(middle - order_.begin());
+  }
+
+  int bin(std::uint32_t light, int axis, float low, float width, int bins) const {
+    return std::clamp(static_cast<int>((lights_[light].center[axis] - low) / width * static_cast<float>(bins)), 0, bins - 1);
+  }
+
+  const std::vector<LightBounds>& lights_;
+  std::vector<std::uint32_t> order_;
+  std::vector<Summary> summaries_;
+};
+
+}  // namespace
+
+LightBvh::LightBvh(const std::vector<LightBounds>& lights) {
+  scale_ = 0;
+  for (const LightBounds& l : lights) scale_ += l.phi;
+  light_slot_.resize(lights.size());
+  if (lights.empty()) return;
+
+  Builder builder(lights, scale_);
+  struct Task {
+    std::uint32_t begin, end, node;
+    int depth;
+  };
+  nodes_.emplace_back();
+  node_slot_.push_back(0);
+  std::vector<Task> tasks{{0, static_cast<std::uint32_t>(lights.size()), 0, 0}};
+  while (!tasks.empty()) {
+    const Task task = tasks.back();
+    tasks.pop_back();
+    const std::vector<Builder::Range> parts = builder.divide(task.begin, task.end, task.depth > 16);
+    Node node{};
+    for (std::uint32_t k = 0; k < parts.size(); ++k) {
+      const auto [begin, end, cost] = parts[k];
+      const LightBounds b = builder.bounds(begin, end);
+      node.cx[k] = b.center.x, node.cy[k] = b.center.y, node.cz[k] = b.center.z;
+      // Allow for rounding in the positions: normalised coordinates are at most 1.
+      node.r2[k] = sqr(b.radius * (1 + 0x1p-18f) + 0x1p-22f);
+      node.ax[k] = b.axis.x, node.ay[k] = b.axis.y, node.az[k] = b.axis.z;
+      node.cos_o[k] = b.cos_o, node.sin_o[k] = safe_sqrt(1 - b.cos_o * b.cos_o), node.cos_e[k] = b.cos_e;
+      node.phi[k] = static_cast<float>(std::max(b.phi / scale_, 1e-30));
+      node.two_sided[k] = b.two_sided ? 1.0f : -1.0f;
+      const std::uint32_t slot = task.node * kWidth + k;
+      if (end - begin == 1) {
+        node.child[k] = kLeaf | builder.light(begin);
+        light_slot_[builder.light(begin)] = slot;
+      } else {
+        node.child[k] = static_cast<std::uint32_t>(nodes_.size());
+        tasks.push_back({begin, end, node.child[k], task.depth + 1});
+        nodes_.emplace_back();
+        node_slot_.push_back(slot);
+      }
+    }
+    nodes_[task.node] = node;
+  }
+}
+
+LightBvh::Lanes LightBvh::lanes(const Node& node, const Vec3& p, const Vec3& n) {
+  // Directions that may contribute a little are not excluded because of rounding; facing factors have a floor.
+  constexpr float kSlack = 1e-4f, kFloor = 1e-3f;
+  const float any_side = n == Vec3(0) ? 1.0f : 0.0f;
+  Lanes result;
+  for (int k = 0; k < kWidth; ++k) {
+    const float x = p.x - node.cx[k], y = p.y - node.cy[k], z = p.z - node.cz[k];
+    const float d2 = std::max(x * x + y * y + z * z, 1e-30f), r2 = node.r2[k];
+    const float inv_d = 1 / std::sqrt(d2);
+    // The lights are seen within theta_b; from within their sphere, in any direction.
+    const bool inside = d2 <= r2;
+    const float sin_b2 = std::min(r2 / d2, 1.0f), sin_b = std::sqrt(sin_b2), cos_b = std::sqrt(1 - sin_b2);
+
+    // Smallest angle at which any of them may emit towards p: theta_w - theta_o - theta_b.
+    const float along = (node.ax[k] * x + node.ay[k] * y + node.az[k] * z) * inv_d;
+    const float cos_w = std::min(std::max(along, -along * node.two_sided[k]), 1.0f);
+    const float sin_w = std::sqrt(std::max(1 - cos_w * cos_w, 0.0f));
+    const float cos_o = node.cos_o[k], sin_o = node.sin_o[k];
+    const bool in_cone = cos_w > cos_o;
+    const float cos_x = in_cone ? 1.0f : cos_w * cos_o + sin_w * sin_o;
+    const float sin_x = in_cone ? 0.0f : sin_w * cos_o - cos_w * sin_o;
+    const float cos_emission = (inside | (cos_x > cos_b)) ? 1.0f : cos_x * cos_b + sin_x * sin_b;
+    const float emission = cos_emission > node.cos_e[k] - kSlack ? std::max(cos_emission, kFloor) : 0.0f;
+
+    // Smallest angle at which they may arrive: theta_i - theta_b.
+    const float cos_i = std::max(std::min(-(n.x * x + n.y * y + n.z * z) * inv_d, 1.0f), -1.0f);
+    const float sin_i = std::sqrt(1 - cos_i * cos_i);
+    const float cos_arrival = (inside | (cos_i > cos_b)) ? 1.0f : cos_i * cos_b + sin_i * sin_b;
+    const float arrival = std::max(any_side, cos_arrival > -kSlack ? std::max(cos_arrival, kFloor) : 0.0f);
+
+    result.importance[k] = node.phi[k] * emission * arrival / std::max(d2, r2);
+  }
+  float total = 0;
+  for (int k = 0; k < kWidth; ++k) total += result.importance[k];
+  result.total = total;
+  return result;
+}
+
+LightBvh::Pick LightBvh::sample(const Lanes& root, const Vec3& p, const Vec3& n, float u) const {
+  Lanes here = root;
+  std::uint32_t node = 0;
+  float pmf = 1;
+  for (;;) {
+    if (!(here.total > 0)) return {};
+    // Find the child whose interval holds u; rounding may leave u behind the last.
+    float rest = u * here.total;
+    int lane = -1;
+    for (int k = 0; k < kWidth; ++k) {
+      if (here.importance[k] <= 0) continue;
+      if (lane >= 0) rest -= here.importance[lane];
+      lane = k;
+      if (rest < here.importance[k]) break;
+    }
+    pmf *= here.importance[lane] / here.total;
+    const std::uint32_t child = nodes_[node].child[lane];
+    if (child & kLeaf) return {child & ~kLeaf, pmf};
+    u = std::clamp(rest / here.importance[lane], 0.0f, kOneMinusEpsilon);
+    node = child;
+    here = lanes(nodes_[node], p, n);
+  }
+}
+
+float LightBvh::pmf(const Lanes& root, const Vec3& p, const Vec3& n, std::uint32_t index) const {
+  float pmf = 1;
+  for (std::uint32_t slot = light_slot_[index];;) {
+    const std::uint32_t node = slot / kWidth, lane = slot % kWidth;
+    if (node == 0) return root.total > 0 ? pmf * root.importance[lane] / root.total : 0.0f;
+    const Lanes here = lanes(nodes_[node], p, n);
+    if (!(here.importance[lane] > 0)) return 0;
+    pmf *= here.importance[lane] / here.total;
+    slot = node_slot_[node];
+  }
+}
+
+}  // namespace ln

@@ -22,12 +22,10 @@ class PathTracing final : public NetworkRun {
       for (int x = tile.x0; x < tile.x1; ++x) {
         if (tile.stopped()) return;
         const std::uint32_t key = hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)), seed_hash());
-        for (std::uint32_t i = 0; i < tile.sample_count; ++i) {
-          const std::uint32_t sample = tile.first_sample + i;
-          const SampleStream random(key, sample);
+        for_samples(key, tile, tracer, [&](const SampleStream& random) {
           const Vec2 pixel = Vec2(static_cast<float>(x), static_cast<float>(y)) + random.get2(kOwn);
-          film.add(x, y, sample, radiance(tracer, camera().ray(pixel), random));
-        }
+          film.add(x, y, random.index(), radiance(tracer, camera().ray(pixel), random));
+        });
       }
     }
   }

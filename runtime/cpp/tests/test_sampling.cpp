@@ -87,3 +87,17 @@ TEST_CASE("dimensions of one pixel are not correlated") {
     CHECK(std::abs(products / n * 12) < 4 / std::sqrt(static_cast<double>(n)));
   }
 }
+
+TEST_CASE("a block gives the same bits as the points one by one") {
+  SampleBlock block;
+  for (const std::uint32_t first : {0u, 48u, 1'000'000u / 16 * 16}) {
+    block.begin(77, first);
+    for (const std::uint32_t d : {0u, 8u, 15u, 16u, 7u * kPerVertex + 15u, 8u * kPerVertex, 100u * kPerVertex}) {
+      for (std::uint32_t i = first; i < first + SampleBlock::kSamples; ++i) {
+        const Vec2 expected = SampleStream(77, i).get2(d), found = SampleStream(77, i, &block).get2(d);
+        CHECK(found.x == expected.x);
+        CHECK(found.y == expected.y);
+      }
+    }
+  }
+}

@@ -6,9 +6,6 @@
 
 namespace ln {
 
-/// Dimensions of the random numbers that belong to one vertex of a path. `kOwn` and above are the operators' own.
-enum Dimension : std::uint32_t { kBsdfDirection, kBsdfLobe, kRoulette, kCoverage, kOwn = 8, kPerVertex = 64 };
-
 /// A direction sampled from a BSDF and what the ray found there.
 struct BsdfRay {
   Ray ray;

@@ -104,6 +104,20 @@ Color eye_radiance(const Network& network, Tracer& tracer, Ray ray, const Sample
   }
 }
 
+/// Calls `work(stream)` for each sample that the tile wants of the pixel with this key.
+template <class Work>
+void for_samples(std::uint32_t key, const Tile& tile, Tracer& tracer, Work&& work) {
+  constexpr std::uint32_t kFewest = 4;  // below, computing a whole block would cost more than it saves
+  const std::uint32_t end = tile.first_sample + tile.sample_count;
+  for (std::uint32_t i = tile.first_sample; i < end;) {
+    const std::uint32_t first = i / SampleBlock::kSamples * SampleBlock::kSamples;
+    const std::uint32_t stop = std::min(end, first + SampleBlock::kSamples);
+    SampleBlock* block = stop - i >= kFewest ? &tracer.samples() : nullptr;
+    if (block) block->begin(key, first);
+    for (; i < stop; ++i) work(SampleStream(key, i, block));
+  }
+}
+
 template <class Network>
 class NetworkProgram final : public NetworkRun {
  public:
@@ -116,7 +130,7 @@ class NetworkProgram final : public NetworkRun {
       for (int x = tile.x0; x < tile.x1; ++x) {
         if (tile.stopped()) return;
         const std::uint32_t key = hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)), seed_hash());
-        for (std::uint32_t i = 0; i < tile.sample_count; ++i) render_sample(x, y, key, tile.first_sample + i, tracer, film);
+        for_samples(key, tile, tracer, [&](const SampleStream& random) { render_sample(x, y, key, random, tracer, film); });
       }
     }
   }
@@ -125,8 +139,8 @@ class NetworkProgram final : public NetworkRun {
   void prepare_network(PrepareStep& step) override { network_.prepare(step); }
 
  private:
-  void render_sample(int x, int y, std::uint32_t key, std::uint32_t sample, Tracer& tracer, Film& film) {
-    const SampleStream random(key, sample);
+  void render_sample(int x, int y, std::uint32_t key, const SampleStream& random, Tracer& tracer, Film& film) {
+    const std::uint32_t sample = random.index();
     const SampleTimer timer(tracer, hash32(key, sample));
     const Vec2 pixel = Vec2(static_cast<float>(x), static_cast<float>(y)) + random.get2(kPixel);
     film.add(x, y, sample, eye_radiance(network_, tracer, camera().ray(pixel), random));

@@ -2,8 +2,10 @@
 // One thread's access to the scene: casts rays, and counts and times them for their nodes.
 
 #include <array>
+#include <memory>
 #include <vector>
 
+#include "ln/sampling.hpp"
 #include "ln/scene.hpp"
 
 namespace ln {
@@ -63,6 +65,9 @@ class Tracer {
   /// Values of the picture's layers for the sample being computed.
   std::vector<Color>& layers() { return layers_; }
 
+  /// Scratch for random numbers.
+  SampleBlock& samples() { return *samples_; }
+
  private:
   friend class NodeTimer;
   friend class SampleTimer;
@@ -70,6 +75,7 @@ class Tracer {
   const Scene* scene_;
   std::vector<NodeCost> costs_;
   std::vector<Color> layers_;
+  std::unique_ptr<SampleBlock> samples_ = std::make_unique<SampleBlock>();
   bool timed_ = false;         // is the present sample timed?
   NodeId timed_node_ = 0;      // the node at work
   std::uint64_t since_ = 0;    // when it began or went on

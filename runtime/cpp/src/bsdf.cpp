@@ -22,6 +22,19 @@ Color multiple_share(const Color& f, float e) { return f * f * e / (1.0f - f * (
 
 }  // namespace
 
+/// Directions for light that bounced several times: what is missing after one bounce is about 1 / (1 + (mu / alpha)^2).
+struct Grazing {
+  float alpha2, log_ratio;
+  explicit Grazing(float alpha) : alpha2(alpha * alpha), log_ratio(std::log(1 + 1 / alpha2)) {}
+
+  Vec3 sample(const Vec2& u) const {
+    const float z2 = std::min(alpha2 * (std::exp(u.x * log_ratio) - 1), 1.0f);
+    const Vec2 c = unit_circle(u.y) * std::sqrt(1 - z2);
+    return {c.x, c.y, std::sqrt(z2)};
+  }
+  float pdf_w(float z) const { return z * kInvPi / ((z * z + alpha2) * log_ratio); }
+};
+
 /// What the transmissive surface does to light that meets it under one cosine.
 struct Bsdf::Interface {
   Color reflected;    // times share
@@ -140,7 +153,7 @@ Color Bsdf::layer_albedo(const FacetAlbedo& f) const {
 }
 
 Color Bsdf::solid_deficit(float cosine, bool side_of_wo) const {
-  const Vec2 d = table_->deficit(side_of_wo == outside_, DielectricTable::Row(std::sqrt(alpha_)), alpha_, cosine);
+  const Vec2 d = table_->deficit(side_of_wo == outside_, std::sqrt(alpha_), cosine);
   return d.x + coating_ * (d.y - d.x);
 }
 
@@ -194,11 +207,10 @@ BsdfValue Bsdf::evaluate_smooth(const View& v, const Vec3& wo, const Vec3& wi, E
   BsdfValue result;
   const bool glossy = rough_ && any(mask & Events::G);
   if (wi.z > 0) {
-    const float cosine_pdf = wi.z * kInvPi;
     const FacetAlbedo at_wi = kValue ? facets(wi.z) : FacetAlbedo{};
     if (any(mask & events_ & Events::D)) {
       if (kValue) result.f_cos += diffuse_ * (1.0f - v.layer) * (1.0f - layer_albedo(at_wi)) * wi.z;
-      if (kDensity) result.pdf_w += v.p_diffuse * cosine_pdf;
+      if (kDensity) result.pdf_w += v.p_diffuse * wi.z * kInvPi;
     }
     if (!glossy) return result;
 
@@ -215,14 +227,14 @@ BsdfValue Bsdf::evaluate_smooth(const View& v, const Vec3& wo, const Vec3& wi, E
     }
     if (kDensity) {
       const float p = v.p_facet * interface.reflection_probability(facet);
-      result.pdf_w += p * density * Ggx::reflection_pdf(wo.z, v.reach, v.cap_share) + v.p_multiple_up * cosine_pdf;
+      result.pdf_w += p * density * Ggx::reflection_pdf(wo.z, v.reach, v.cap_share) + v.p_multiple_up * Grazing(alpha_).pdf_w(wi.z);
     }
     return result;
   }
 
   if (!glossy || wall_ == Wall::opaque || !(wi.z < 0)) return result;
   const Ggx ggx(alpha_);
-  const float z_i = -wi.z, cosine_pdf = z_i * kInvPi;
+  const float z_i = -wi.z;
   if (wall_ == Wall::thin) {
     // A reflection whose direction passes to the other side.
     const Vec3 h = wo + Vec3(wi.x, wi.y, z_i);
@@ -236,7 +248,7 @@ BsdfValue Bsdf::evaluate_smooth(const View& v, const Vec3& wo, const Vec3& wi, E
     if (kDensity) {
       const Color facet = facet_f0_ + (facet_f90_ - facet_f0_) * schlick_weight(om);
       const float p = v.p_facet * (1 - interface.reflection_probability(facet));
-      result.pdf_w = p * density * Ggx::reflection_pdf(wo.z, v.reach, 1) + v.p_multiple_down * cosine_pdf;
+      result.pdf_w = p * density * Ggx::reflection_pdf(wo.z, v.reach, 1) + v.p_multiple_down * Grazing(alpha_).pdf_w(z_i);
     }
     return result;
   }
@@ -260,7 +272,7 @@ BsdfValue Bsdf::evaluate_smooth(const View& v, const Vec3& wo, const Vec3& wi, E
   }
   if (table_) {
     if (kValue) result.f_cos += multiple_down_ * v.solid_deficit * solid_deficit(z_i, false) * (z_i * to_radiance);
-    if (kDensity) result.pdf_w += v.p_multiple_down * cosine_pdf;
+    if (kDensity) result.pdf_w += v.p_multiple_down * Grazing(alpha_).pdf_w(z_i);
   }
   return result;
 }
@@ -309,10 +321,10 @@ bool Bsdf::layered_sample(const Vec3& wo, float u_lobe, const Vec2& u, Events ma
       return true;
     }
   } else if (u_lobe -= v.p_facet; u_lobe < v.p_multiple_up || v.p_multiple_down == 0) {
-    sample.wi = sample_cosine(u);
+    sample.wi = Grazing(alpha_).sample(u);
     sample.event = Events::G;
   } else {
-    sample.wi = sample_cosine(u);
+    sample.wi = Grazing(alpha_).sample(u);
     sample.wi.z = -sample.wi.z;
     sample.event = Events::G;
   }

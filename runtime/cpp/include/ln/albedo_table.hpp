@@ -25,16 +25,18 @@ struct RoughnessRow {
   }
 };
 
-/// Bilinear look-up of a pair of values in a table of Rows x Columns pairs.
-template <int Rows, int Columns>
-inline Vec2 lookup(const float (&table)[Rows][Columns][2], const RoughnessRow<Rows>& at, float alpha, float mu) {
-  const float u = std::sqrt(std::clamp(mu * (1 + alpha) / (mu + alpha), 0.0f, 1.0f)) * (Columns - 1);
-  const int column = std::min(static_cast<int>(u), Columns - 2);
-  const float s = u - static_cast<float>(column), t = at.fraction;
-  const float* a = table[at.row][column];
-  const float* b = table[at.row + 1][column];
+/// Column of cosine `mu`, from 0 to 1.
+inline float grazing_column(float alpha, float mu) { return std::sqrt(std::clamp(mu * (1 + alpha) / (mu + alpha), 0.0f, 1.0f)); }
+
+/// Bilinear look-up between two rows of pairs of values, `t` from one to the other, at `column` in [0, 1].
+template <int Columns>
+inline Vec2 lookup(const float (*row)[2], const float (*next)[2], float t, float column) {
+  const float x = column * (Columns - 1);
+  const int i = std::min(static_cast<int>(x), Columns - 2);
+  const float s = x - static_cast<float>(i);
   const float wa = (1 - t) * (1 - s), wb = (1 - t) * s, wc = t * (1 - s), wd = t * s;
-  return {wa * a[0] + wb * a[2] + wc * b[0] + wd * b[2], wa * a[1] + wb * a[3] + wc * b[1] + wd * b[3]};
+  const float *a = row[i], *b = row[i + 1], *c = next[i], *d = next[i + 1];
+  return {wa * a[0] + wb * b[0] + wc * c[0] + wd * d[0], wa * a[1] + wb * b[1] + wc * c[1] + wd * d[1]};
 }
 
 /// Single-bounce albedo of GGX with Schlick's Fresnel: it is f0 * (1 - deficit - schlick) + f90 * schlick.
@@ -48,12 +50,17 @@ inline constexpr int kRows = 64, kColumns = 64, kAverages = 256;
 using Row = RoughnessRow<kRows>;
 /// Pairs (deficit, shift): the average of Schlick's weight over what is reflected is that of the cosine mu + alpha * shift.
 extern const float kFacets[kRows][kColumns][2];
-/// Pairs (cosine-weighted average deficit / alpha^2, average of the Schlick part).
+/// Cosine-weighted averages of what `facets` returns, as pairs (deficit / alpha^2, Schlick part).
 extern const float kAverage[kAverages][2];
 
-inline FacetAlbedo facets(const Row& row, float alpha, float mu) {
-  const Vec2 v = lookup(kFacets, row, alpha, mu);
-  return {v.x, (1 - v.x) * std::clamp(1 - mu - alpha * v.y, 0.0f, 1.0f) * sqr(sqr(std::clamp(1 - mu - alpha * v.y, 0.0f, 1.0f)))};
+inline FacetAlbedo facets(const float (*row)[2], const float (*next)[2], float fraction, float alpha, float mu) {
+  const Vec2 v = lookup<kColumns>(row, next, fraction, grazing_column(alpha, mu));
+  const float x = std::clamp(1 - mu - alpha * v.y, 0.0f, 1.0f), x2 = x * x;
+  return {v.x, (1 - v.x) * x2 * x2 * x};
+}
+
+inline FacetAlbedo facets(const Row& at, float alpha, float mu) {
+  return facets(kFacets[at.row], kFacets[at.row + 1], at.fraction, alpha, mu);
 }
 
 inline FacetAlbedo facets_average(float roughness) {

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from lnc.library import Operator, Parameter, Port, Scalar
 from lnc.paths.automaton import EventTable
+from lnc.paths.language import Alphabet
 from lnc.source import Span
 from lnc.syntax.ast import PathExpression, Value
 
@@ -47,7 +48,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Input:
-    """What a port reads. `cast` forces a representation: `direct as QuadTree`."""
+    """What a port reads."""
 
     port: Port
     terms: tuple[Term, ...]
@@ -133,10 +134,19 @@ class Network:
 
 @dataclass(frozen=True)
 class TypedNetwork:
-    """A network whose wires have contents; after insert_converters every port gets the representation it takes."""
+    """A network with the representation of every wire; after insert_converters every port gets what it takes."""
 
     network: Network
-    contents: dict[str, tuple[str, ...]]  # wire -> angular contents, in the order of library.CONTENTS
+    representations: dict[str, str]
+    alphabet: Alphabet  # the tags that the network tells apart
+
+
+@dataclass(frozen=True)
+class PathReport:
+    """Light paths as readable expressions: per wire and content, and of the picture."""
+
+    wires: dict[str, tuple[tuple[str, str], ...]]  # wire -> (content, expression)
+    image: str | None
 
 
 # --- Schedule: all that code generation needs -------------------------------------------------------------------------

@@ -7,6 +7,7 @@ tag combinations.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 STATE_LIMIT = 4096
@@ -51,17 +52,6 @@ class Dfa:
     def is_empty(self) -> bool:
         return not any(self.accepting)
 
-    @property
-    def accepts_nothing_but_events(self) -> bool:
-        return not self.accepting[0]
-
-    def first_letters(self) -> int:
-        """Every letter with which a word can begin."""
-        letters = 0
-        for mask, _ in self.edges[0]:
-            letters |= mask
-        return letters
-
     def length_bounds(self) -> tuple[int, int | None]:
         """The shortest and the longest number of letters in a word; None is unbounded."""
         depth = {0: 0}
@@ -84,7 +74,13 @@ class Dfa:
 
 def determinise(nfa: Nfa, limit: int = STATE_LIMIT) -> Dfa:
     """Subset construction, then minimisation. Raises TooLarge."""
-    blocks = letter_blocks(letters for row in nfa.edges for letters, _ in row)
+    useful = _co_reachable(
+        [[t for _, t in row] + silent for row, silent in zip(nfa.edges, nfa.silent, strict=True)],
+        [s in nfa.accepting for s in range(len(nfa.edges))],
+    )
+    if 0 not in useful:
+        return Dfa(((),), (False,))
+    blocks = letter_blocks(letters for s in useful for letters, t in nfa.edges[s] if t in useful)
     closures: dict[int, frozenset[int]] = {}
 
     def closure(state: int) -> frozenset[int]:
@@ -93,7 +89,7 @@ def determinise(nfa: Nfa, limit: int = STATE_LIMIT) -> Dfa:
             stack = [state]
             while stack:
                 for target in nfa.silent[stack.pop()]:
-                    if target not in seen:
+                    if target not in seen and target in useful:
                         seen.add(target)
                         stack.append(target)
             closures[state] = frozenset(seen)
@@ -105,7 +101,7 @@ def determinise(nfa: Nfa, limit: int = STATE_LIMIT) -> Dfa:
     queue = [start]
     for subset in queue:
         row: list[int] = []
-        moves = [edge for state in sorted(subset) for edge in nfa.edges[state]]
+        moves = [edge for state in sorted(subset) for edge in nfa.edges[state] if edge[1] in useful]
         for block in blocks:
             reached: set[int] = set()
             for letters, target in moves:
@@ -126,10 +122,10 @@ def determinise(nfa: Nfa, limit: int = STATE_LIMIT) -> Dfa:
     return _minimise(rows, accepting, blocks)
 
 
-def letter_blocks(masks: object) -> list[int]:
+def letter_blocks(masks: Iterable[int]) -> list[int]:
     """The coarsest partition of the letters in which every given set is a union of blocks."""
     blocks: list[int] = []
-    for mask in sorted(set(masks)):  # type: ignore[call-overload]
+    for mask in sorted(set(masks)):
         fresh = mask
         split: list[int] = []
         for block in blocks:

@@ -1,0 +1,135 @@
+"""The spine: the rooms that a network walks through, in order.
+
+    parse -> resolve -> typecheck -> insert_converters -> check_cycles -> contents -> schedule   (-> codegen, build)
+                                                                               \\-> light_paths  (for explain, graph)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from lnc.diagnostics import Diagnostic, InternalError, Reporter
+from lnc.library import Library
+from lnc.library_reader import load_library
+from lnc.network import PathReport, Schedule, TypedNetwork
+from lnc.passes.check_cycles import check_cycles
+from lnc.passes.contents import contents
+from lnc.passes.insert_converters import insert_converters
+from lnc.passes.resolve import resolve
+from lnc.passes.schedule import print_schedule, schedule
+from lnc.passes.typecheck import typecheck
+from lnc.source import SourceFile
+from lnc.syntax import ast
+from lnc.syntax.parse import parse
+
+SIZE_LIMIT = 256 * 1024
+STAGES = ("parse", "resolve", "typecheck", "insert_converters", "schedule")
+
+Dump = Callable[[str, str], None]
+"""Called with the name of a stage and its result as text."""
+
+
+class Unreadable(Exception):
+    """A file that cannot be read as a network; the text says why."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """How far a network came: each stage is None if an earlier one found an error."""
+
+    file: ast.File
+    typed: TypedNetwork | None
+    contents: dict[str, tuple[str, ...]]
+    schedule: Schedule | None
+    diagnostics: list[Diagnostic]
+
+    @property
+    def failed(self) -> bool:
+        return any(d.severity == "error" for d in self.diagnostics)
+
+
+def read_source(path: str) -> SourceFile:
+    """A network's text. Raises Unreadable."""
+    try:
+        with Path(path).open("rb") as file:
+            content = file.read(SIZE_LIMIT + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "not a valid path"
+        raise Unreadable(f"{path}: cannot be read: {reason}") from error
+    if len(content) > SIZE_LIMIT:
+        raise Unreadable(f"{path}: is larger than {SIZE_LIMIT // 1024} KB, which no network is")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise Unreadable(f"{path}: is not UTF-8 text (line {line})") from error
+    return SourceFile(path, text.replace("\r\n", "\n"))
+
+
+def compile_network(source: SourceFile, library: Library, dump: Dump | None = None) -> Result:
+    """All passes over one text; each works only if those before it found no error."""
+    reporter = Reporter()
+    file = parse(source, reporter)
+    _dump_text(dump, "parse", file)
+    name = _default_name(source.name)
+    network = resolve(file, name, library, reporter)
+    if reporter.failed:
+        return Result(file, None, {}, None, reporter.sorted())
+    typed = typecheck(network, reporter)
+    if not reporter.failed:
+        typed = insert_converters(typed, library, reporter)
+        _check_inserted(typed, reporter)
+    if not reporter.failed:
+        check_cycles(typed.network, reporter)
+    if reporter.failed:
+        return Result(file, None, {}, None, reporter.sorted())
+    found = contents(typed.network, reporter)
+    plan = None if reporter.failed else schedule(typed.network, found)
+    if dump is not None and plan is not None:
+        from lnc.syntax.explicit import explicit
+
+        dump("insert_converters", explicit(file, typed.network))
+        dump("schedule", print_schedule(plan))
+    return Result(file, typed, found, plan, reporter.sorted())
+
+
+def describe_paths(typed: TypedNetwork) -> PathReport:
+    """The light paths of a network that has passed."""
+    from lnc.passes.light_paths import light_paths
+
+    return light_paths(typed.network, typed.alphabet)
+
+
+def compile_file(path: str, ops: tuple[str, ...] = (), dump: Dump | None = None) -> Result:
+    """Read and compile a network. Raises Unreadable; faults in the library come first among the diagnostics."""
+    source = read_source(path)
+    library, faults = load_library(ops)
+    if faults:
+        return Result(ast.File((), (), faults[0].span), None, {}, None, faults)
+    return compile_network(source, library, dump)
+
+
+def _check_inserted(typed: TypedNetwork, reporter: Reporter) -> None:
+    """After insertion every port gets its own representation."""
+    if reporter.failed:
+        return
+    for node in typed.network.nodes:
+        for given in node.inputs:
+            for term in given.terms:
+                if typed.representations[term.node] != given.port.representation:
+                    raise InternalError(f"{node.name}.{given.port.name} reads {term.node} of another representation")
+
+
+def _dump_text(dump: Dump | None, stage: str, file: ast.File) -> None:
+    if dump is not None:
+        from lnc.syntax.printer import print_file
+
+        dump(stage, print_file(file))
+
+
+def _default_name(path: str) -> str:
+    """The file's name as an identifier."""
+    stem = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in Path(path).stem)
+    return stem if stem and not stem[0].isdigit() else f"network_{stem}"

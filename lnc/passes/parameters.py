@@ -1,0 +1,142 @@
+"""A value in the text -> the value of a declared parameter, checked. Faults are LN0104, unknown tags LN0102."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from lnc.diagnostics import Reporter, did_you_mean, quote
+from lnc.library import Parameter, Scalar
+from lnc.network import ParameterValue, PathValue
+from lnc.paths.automaton import STATE_LIMIT, TooLarge
+from lnc.paths.language import EVENTS, TAG_LIMIT, Alphabet, event_table, path_dfa, tags_in
+from lnc.source import Span
+from lnc.syntax import ast
+from lnc.syntax.printer import print_path
+from lnc.values import UNITS, ValueFault, number
+
+WANTED = {
+    "flag": "true or false",
+    "text": "a text in quotation marks",
+    "path": "a light path such as (D|G|S)*",
+    "tags": "the name of a tag",
+    "count": "a whole number such as 200k",
+    "number": "a number",
+    "ratio": "a ratio such as 1%",
+    "length": "a length such as 5cm",
+    "angle": "an angle such as 30deg",
+    "time": "a time such as 10s",
+}
+
+
+def parameter_value(
+    parameter: Parameter, value: ast.Value | None, tags: Collection[str], reporter: Reporter
+) -> ParameterValue | None:
+    """The parameter with `value`, or with its default where that is None; None if it is wrong and reported."""
+    if value is None:
+        if parameter.type == "path" and parameter.default is not None:
+            return ParameterValue(parameter, _path_value(parameter.default), None)  # type: ignore[arg-type]
+        return ParameterValue(parameter, parameter.default, None)  # type: ignore[arg-type]
+    try:
+        return ParameterValue(parameter, _convert(parameter, value, tags, reporter), value)
+    except ValueFault as fault:
+        if str(fault):
+            help = did_you_mean(value.name, parameter.choices) if isinstance(value, ast.NameValue) else None
+            reporter.error("LN0104", value.span, f"'{parameter.name}': {fault}", help=help)
+        return None
+
+
+def _convert(
+    parameter: Parameter, value: ast.Value, tags: Collection[str], reporter: Reporter
+) -> Scalar | PathValue:
+    match parameter.type, value:
+        case kind, ast.NumberValue(text) if kind in UNITS:
+            return _in_range(parameter, number(text, kind), text)
+        case "flag", ast.FlagValue(flag):
+            return flag
+        case "choice", ast.NameValue(name) if name in parameter.choices:
+            return name
+        case "text", ast.TextValue(text):
+            if not text or len(text) > 200 or not text.isprintable():
+                raise ValueFault("a text of 1 to 200 printable characters is wanted")
+            return text
+        case "tags", ast.NameValue(name):
+            if name not in tags:
+                help = did_you_mean(name, tags) or f"define it: tag {name} = material \"...\""
+                reporter.error("LN0102", value.span, f"no tag is called {quote(name)}", help=help)
+                raise ValueFault("")
+            return name
+        case "path", ast.NameValue(name):
+            return _path(parameter, _letters_or_tag(name, value.span), tags, reporter)
+        case "path", ast.PathLiteral(path):
+            return _path(parameter, path, tags, reporter)
+    wanted = f"one of {', '.join(parameter.choices)}" if parameter.type == "choice" else WANTED[parameter.type]
+    raise ValueFault(f"{wanted} is wanted, not {quote(value.span.text)}")
+
+
+def _in_range(parameter: Parameter, value: Scalar, text: str) -> Scalar:
+    low, high = parameter.low, parameter.high
+    if isinstance(value, str) or low is None or high is None or low <= value <= high:
+        return value
+    bounds = f"{_plain(low, parameter.type)} to {_plain(high, parameter.type)}"
+    raise ValueFault(f"{quote(text)} is outside of its range {bounds}")
+
+
+def _plain(value: float, type: str) -> str:
+    if type == "ratio":
+        return f"{value * 100:g}%"
+    for factor, suffix in ((1e9, "G"), (1e6, "M"), (1e3, "k")) if type in ("count", "number") else ():
+        if abs(value) >= factor and value % factor == 0:
+            return f"{value / factor:g}{suffix}"
+    return f"{value:g}" + {"length": "m", "angle": "rad", "time": "s"}.get(type, "")
+
+
+def _letters_or_tag(name: str, span: Span) -> ast.PathExpression:
+    if set(name) <= set("LDGSE"):
+        events: list[ast.PathExpression] = [ast.PathEvents(letter, None, span) for letter in name]
+        return ast.PathConcat(tuple(events), span) if len(events) > 1 else events[0]
+    return ast.PathName(name, None, span)
+
+
+def _path(
+    parameter: Parameter, path: ast.PathExpression, tags: Collection[str], reporter: Reporter
+) -> PathValue:
+    used = tags_in(path)
+    unknown = sorted(used - set(tags))
+    if unknown:
+        help = did_you_mean(unknown[0], tags)
+        reporter.error("LN0102", path.span, f"no tag is called {quote(unknown[0])}", help=help)
+        raise ValueFault("")
+    if len(used) > TAG_LIMIT:
+        raise ValueFault(f"a path may name {TAG_LIMIT} tags at most")
+    for letters in sorted(letters_in(path)):
+        if not set(letters) <= set(EVENTS):
+            raise ValueFault("it lists scattering events only: D, G and S, without L and E")
+    try:
+        value = _path_value(path)
+        dfa = path_dfa(path, Alphabet(tuple(sorted(used))))
+    except TooLarge:
+        raise ValueFault(f"this path needs more than {STATE_LIMIT} states") from None
+    if dfa.is_empty:
+        raise ValueFault("no path fits this expression")
+    shortest, longest = dfa.length_bounds()
+    if parameter.low is not None and parameter.high is not None:
+        if shortest < parameter.low or longest is None or longest > parameter.high:
+            one = parameter.low == parameter.high == 1
+            wanted = "one event" if one else f"{parameter.low:g} to {parameter.high:g} events"
+            raise ValueFault(f"exactly {wanted} is wanted" if one else f"{wanted} are wanted")
+    return value
+
+
+def letters_in(path: ast.PathExpression) -> set[str]:
+    match path:
+        case ast.PathEvents(letters):
+            return {letters}
+        case ast.PathConcat(items) | ast.PathUnion(items):
+            return set().union(*map(letters_in, items))
+        case ast.PathRepeat(item) | ast.PathTagged(item):
+            return letters_in(item)
+    return set()
+
+
+def _path_value(path: ast.PathExpression) -> PathValue:
+    return PathValue(print_path(path), path, event_table(path))

@@ -1,0 +1,452 @@
+"""Names -> library declarations and parameter values.
+
+    light  = Lights()                       Node light  = Lights
+    direct = Direct(light, samples = 4)     Node direct = Direct, port light <- light, samples = 4, to = None
+    image  direct + PathTracer(direct)      Node image_tracer = PathTracer; image <- direct + image_tracer
+
+On entry: any syntax tree whose macros are expanded. On exit: every port names wires that exist, every parameter has a
+checked value, calls inside expressions are nodes of their own. What cannot be resolved is reported once and left out.
+Representations are left to typecheck and insert_converters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lnc.conversions import cheapest_chains
+from lnc.diagnostics import Related, Reporter, did_you_mean, quote
+from lnc.library import Library, Operator, Parameter, Port, snake_case
+from lnc.network import Expectation, Image, Input, Network, Node, ParameterValue, Tag, Tap, Term
+from lnc.passes.parameters import parameter_value
+from lnc.paths.language import tags_in
+from lnc.source import Span
+from lnc.syntax import ast
+
+TAG_KINDS = ("material", "mesh", "node")
+
+
+def resolve(file: ast.File, name: str, library: Library, reporter: Reporter) -> Network:
+    """The network of a file; `name` is its name if the text gives none."""
+    return _Resolver(file, library, reporter).run(name)
+
+
+@dataclass(frozen=True)
+class _Home:
+    """Where an expression stands: the name that calls inside it derive theirs from, and the statement."""
+
+    name: str
+    statement: Span
+
+
+class _Resolver:
+    def __init__(self, file: ast.File, library: Library, reporter: Reporter) -> None:
+        self.file = file
+        self.library = library
+        self.reporter = reporter
+        self.equations: dict[str, ast.Equation] = {}
+        self.tags: dict[str, Tag] = {}
+        self.nodes: list[Node] = []
+        self.names: set[str] = set()
+        self.made: set[str] = set()  # names in `nodes`
+        self.used: set[str] = set()
+        self.ends: dict[str, str | None] = {}  # second names -> the wire they stand for
+        self.circular: set[str] = set()
+
+    def run(self, name: str) -> Network:
+        names = [s for s in self.file.statements if isinstance(s, ast.NetworkName)]
+        for again in names[1:]:
+            self._twice(again.span, "the network has a name already", names[0].span)
+        self._collect()
+        for equation in self.equations.values():
+            self._equation(equation)
+        image: Image | None = None
+        taps: list[Tap] = []
+        expectations: list[Expectation] = []
+        for statement in self.file.statements:
+            match statement:
+                case ast.ImageStatement(wire, layers):
+                    terms = self._wire(wire, _Home("image", statement.span))
+                    if image is not None:
+                        self._twice(statement.span, "the network has an image already", image.span)
+                    else:
+                        image = Image(terms or (), layers, statement.span)
+                case ast.TapStatement(wire, path):
+                    terms = self._wire(wire, _Home("tap", statement.span))
+                    if not path.lower().endswith(".exr") or "\0" in path:
+                        message = f"a tap writes OpenEXR files (.exr), not {quote(path)}"
+                        self.reporter.error("LN0104", statement.file_span, message)
+                    taps.append(Tap(terms or (), path, statement.span))
+                case ast.Expect(path, at_most):
+                    self._check_tags(path)
+                    expectations.append(Expectation(path, at_most, statement.span))
+                case ast.LightmapStatement() | ast.ProbeStatement():
+                    word = statement.span.text.split()[0]
+                    self.reporter.error("LN0110", statement.span, f"'{word}' is not supported yet")
+                case ast.OperatorDeclaration() | ast.RepresentationDeclaration():
+                    message = "declarations belong into a folder of an operator library"
+                    self.reporter.error("LN0110", statement.span, message, help="give its folder by --ops")
+        if image is None and not taps and not self.reporter.failed:
+            start = self.file.statements[0].span if self.file.statements else self.file.span
+            self.reporter.error("LN0109", start, "the network has no result", help="add: image WIRE")
+        self._report_unused()
+        return Network(
+            name=names[0].name if names else name,
+            file=self.file.span.source.name,
+            nodes=tuple(self.nodes),
+            tags=tuple(self.tags.values()),
+            image=image,
+            taps=tuple(taps),
+            expectations=tuple(expectations),
+        )
+
+    # --- Definitions --------------------------------------------------------------------------------------------------
+
+    def _collect(self) -> None:
+        for statement in self.file.statements:
+            if isinstance(statement, ast.Equation):
+                if statement.name in self.equations:
+                    first = self.equations[statement.name].name_span
+                    self._twice(statement.name_span, f"the wire {quote(statement.name)} is defined twice", first)
+                else:
+                    self.equations[statement.name] = statement
+                    self.names.add(statement.name)
+            elif isinstance(statement, ast.TagStatement):
+                if statement.name in self.tags:
+                    first = self.tags[statement.name].span
+                    self._twice(statement.name_span, f"the tag {quote(statement.name)} is defined twice", first)
+                else:
+                    self.tags[statement.name] = self._tag(statement)
+
+    def _tag(self, statement: ast.TagStatement) -> Tag:
+        for glob in statement.globs:
+            if glob.kind not in TAG_KINDS:
+                message = f"a tag is a glob on material, mesh or node names, not on {quote(glob.kind)}"
+                self.reporter.error("LN0102", glob.span, message, help=did_you_mean(glob.kind, TAG_KINDS))
+        globs = tuple((g.kind, g.glob) for g in statement.globs) or (("extras", statement.name),)
+        return Tag(statement.name, globs, statement.name_span)
+
+    def _equation(self, equation: ast.Equation) -> None:
+        if equation.representation is not None and equation.representation not in self.library.representations:
+            self._unknown_representation(equation.representation, equation.name_span)
+        home = _Home(equation.name, equation.span)
+        match equation.wire:
+            case ast.Call() as call:
+                self._call(call, equation.name, "equation", home, equation.representation)
+            case ast.Cast() as cast:
+                self._cast(cast, equation.name, home)
+            case ast.WireSum() as wire:
+                terms = self._wire(wire, home)
+                sum_op = self.library.operators["Sum"]
+                if terms is not None:
+                    inputs = (Input(sum_op.ports[0], terms, wire.span),)
+                    self._add(equation.name, sum_op, inputs, (), "equation", home, wire.span, equation.representation)
+            case ast.WireName():
+                self._alias(equation)
+
+    def _alias(self, equation: ast.Equation) -> None:
+        """A second name for a wire: no node, but its end must exist and must not be itself."""
+        if isinstance(equation.wire, ast.WireName):
+            if equation.wire.name not in self.equations:
+                self._unknown_wire(equation.wire)
+            elif self._alias_end(equation.name) is None and equation.name in self.circular:
+                message = f"the wire {quote(equation.name)} is defined by nothing but itself"
+                self.reporter.error("LN0402", equation.span, message)
+
+    def _alias_end(self, name: str) -> str | None:
+        """The wire that a name stands for, through all second names; None if there is none."""
+        chain: list[str] = []
+        end: str | None = name
+        while end is not None and end not in self.ends:
+            wire = self.equations[end].wire if end in self.equations else None
+            self.ends[end] = None  # until it is known; meeting it again is a circle
+            chain.append(end)
+            if not isinstance(wire, ast.WireName):
+                self.ends[end] = end if wire is not None else None
+                break
+            end = wire.name
+            if end in chain:
+                self.circular.add(end)
+        result = self.ends[end] if end is not None else None
+        for link in chain:
+            self.ends[link] = result
+        return result
+
+    # --- Wires --------------------------------------------------------------------------------------------------------
+
+    def _wire(self, wire: ast.WireExpression, home: _Home) -> tuple[Term, ...] | None:
+        """The wires that an expression adds up; None if it is wrong, which has been reported."""
+        match wire:
+            case ast.WireName():
+                return self._wire_name(wire)
+            case ast.Call(op):
+                name = self._derived(home.name, op)
+                self._call(wire, name, "nested", home)
+                return (Term(name, 1.0, wire.span),) if name in self.made else None
+            case ast.Cast():
+                return self._cast(wire, None, home)
+        terms: list[Term] = []
+        wrong = False
+        for part in wire.terms:
+            inner = self._wire(part.wire, home)
+            if inner is None:
+                wrong = True
+                continue
+            sign = -1.0 if part.negative else 1.0
+            terms += [Term(t.node, sign * t.weight, t.span) for t in inner]
+        return None if wrong else tuple(terms)
+
+    def _wire_name(self, wire: ast.WireName) -> tuple[Term, ...] | None:
+        if wire.name not in self.equations:
+            self._unknown_wire(wire)
+            return None
+        self.used.add(wire.name)
+        end = self._alias_end(wire.name)
+        if end is None:
+            return None
+        self.used.add(end)
+        return (Term(end, 1.0, wire.span),)
+
+    def _unknown_wire(self, wire: ast.WireName) -> None:
+        message = f"no wire is called {quote(wire.name)}"
+        if wire.name in self.library.operators:
+            help: str | None = f"'{wire.name}' is an operator: write {wire.name}(...)"
+        elif wire.name in self.tags:
+            help = f"'{wire.name}' is a tag; tags are given as parameters: from = {wire.name}"
+        else:
+            help = did_you_mean(wire.name, self.equations)
+        self.reporter.error("LN0102", wire.span, message, help=help)
+
+    def _derived(self, base: str, op: str) -> str:
+        """A free name for a node without one: `caustic` and KDPhotonTree give `caustic_tree`."""
+        word = snake_case(op)[:100].rsplit("_", 1)[-1] or "wire"
+        return self._free(f"{base}_{word}")
+
+    def _free(self, name: str) -> str:
+        free, number = name, 1
+        while free in self.names:
+            number += 1
+            free = f"{name}_{number}"
+        self.names.add(free)
+        return free
+
+    # --- Calls --------------------------------------------------------------------------------------------------------
+
+    def _call(self, call: ast.Call, name: str, origin: str, home: _Home, annotation: str | None = None) -> None:
+        op = self.library.operators.get(call.op)
+        if op is None:
+            self._unknown_operator(call)
+            for wire in call.inputs:  # look for further mistakes
+                self._wire(wire, home)
+            return
+        inputs = self._inputs(call, op, home if origin == "equation" else _Home(name, home.statement))
+        parameters = self._parameters(call, op)
+        if inputs is not None and parameters is not None:
+            self._add(name, op, inputs, parameters, origin, home, call.span, annotation)
+
+    def _unknown_operator(self, call: ast.Call) -> None:
+        message = f"no operator is called {quote(call.op)}"
+        help = did_you_mean(call.op, self.library.operators)
+        if call.op in self.equations:
+            help = f"'{call.op}' is a wire; wires take no arguments"
+        self.reporter.error("LN0102", call.op_span, message, help=help or "lnc ops lists all operators")
+
+    def _inputs(self, call: ast.Call, op: Operator, home: _Home) -> tuple[Input, ...] | None:
+        wrong = False
+        given: dict[str, Input] = {}
+        ports = list(op.ports)
+        variadic: list[tuple[Port, tuple[Term, ...], Span]] = []
+        for i, wire in enumerate(call.inputs):
+            terms = self._wire(wire, home)
+            if i < len(ports):
+                port = ports[i]
+            elif ports and ports[-1].variadic:
+                port = ports[-1]
+            else:
+                self._too_many_wires(op, wire.span)
+                wrong = True
+                break
+            if terms is None:
+                wrong = True
+                terms = ()
+            if port.variadic:
+                variadic.append((port, terms, wire.span))
+            else:
+                given[port.name] = Input(port, terms, wire.span)
+        if variadic:
+            all_terms = tuple(t for _, terms, _ in variadic for t in terms)
+            given[variadic[0][0].name] = Input(variadic[0][0], all_terms, variadic[0][2].to(variadic[-1][2]))
+        for argument in call.arguments:
+            port_named = op.port(argument.name)
+            if port_named is not None:
+                wrong |= not self._named_port(argument, port_named, given)
+        missing = [p for p in op.ports if p.name not in given]
+        if missing and not wrong:
+            wanted = " and ".join(f"'{p.name}: {p.representation}'" for p in missing)
+            message = f"'{op.name}' needs its input {wanted}"
+            self.reporter.error("LN0105", call.span, message, related=[_declared_here(op, missing[0].span)])
+        if missing or wrong:
+            return None
+        return tuple(given[p.name] for p in op.ports)
+
+    def _too_many_wires(self, op: Operator, span: Span) -> None:
+        if not op.ports:
+            message = f"'{op.name}' takes no wires"
+        else:
+            message = f"'{op.name}' takes {len(op.ports)} wire{'s' if len(op.ports) > 1 else ''}"
+        help = "parameters are given by name: parameter = value" if op.parameters else None
+        self.reporter.error("LN0107", span, message, help=help, related=[_declared_here(op, op.span)])
+
+    def _named_port(self, argument: ast.Argument, port: Port, given: dict[str, Input]) -> bool:
+        if port.name in given:
+            first = given[port.name].span
+            self._twice(argument.span, f"the input '{port.name}' is given twice", first, "LN0107")
+            return False
+        if not isinstance(argument.value, ast.NameValue):
+            message = f"'{port.name}' is an input: by name it takes a single wire"
+            help = "give the expression by position, or give it a name in an equation of its own"
+            self.reporter.error("LN0104", argument.value.span, message, help=help)
+            return False
+        terms = self._wire_name(ast.WireName(argument.value.name, argument.value.span))
+        given[port.name] = Input(port, terms or (), argument.value.span)
+        return terms is not None
+
+    def _parameters(self, call: ast.Call, op: Operator) -> tuple[ParameterValue, ...] | None:
+        given: dict[str, ast.Argument] = {}
+        wrong = False
+        for argument in call.arguments:
+            if op.port(argument.name) is not None:
+                continue
+            if op.parameter(argument.name) is None:
+                known = [p.name for p in op.parameters] + [p.name for p in op.ports]
+                message = f"'{op.name}' has no parameter {quote(argument.name)}"
+                close = did_you_mean(argument.name, known)
+                listed = f"it has: {', '.join(known)}" if known else "it has none"
+                self.reporter.error("LN0103", argument.name_span, message, help=close or listed)
+                wrong = True
+            elif argument.name in given:
+                first = given[argument.name].span
+                self._twice(argument.span, f"the parameter '{argument.name}' is given twice", first, "LN0107")
+                wrong = True
+            else:
+                given[argument.name] = argument
+        values = [self._parameter(p, given.get(p.name), call) for p in op.parameters]
+        if wrong or any(v is None for v in values):
+            return None
+        return tuple(v for v in values if v is not None)
+
+    def _parameter(self, parameter: Parameter, argument: ast.Argument | None, call: ast.Call) -> ParameterValue | None:
+        if argument is None and parameter.default is None and parameter.type != "tags":
+            message = f"'{call.op}' needs its parameter '{parameter.name}: {parameter.type}'"
+            self.reporter.error("LN0105", call.span, message)
+            return None
+        return parameter_value(parameter, argument.value if argument else None, self.tags, self.reporter)
+
+    # --- Conversions that are asked for -------------------------------------------------------------------------------
+
+    def _cast(self, cast: ast.Cast, name: str | None, home: _Home) -> tuple[Term, ...] | None:
+        """`wire as Representation(...)`: the cheapest chain, its last node called `name` if there is one."""
+        terms = self._wire(cast.wire, home)
+        if cast.representation not in self.library.representations:
+            self._unknown_representation(cast.representation, cast.representation_span)
+            return None
+        found = self._representation(cast.wire)
+        if terms is None or found is None:
+            return None
+        if len(terms) > 1:
+            sum_op = self.library.operators["Sum"]
+            summed = self._derived(home.name, "Sum")
+            self._add(summed, sum_op, (Input(sum_op.ports[0], terms, cast.wire.span),), (), "nested", home, cast.span)
+            terms = (Term(summed, 1.0, cast.wire.span),)
+        chains = cheapest_chains(self.library, found, cast.representation)
+        if len(chains) != 1 or not chains[0]:
+            return self._no_single_chain(cast, found, chains)
+        accepted = {p.name for op in chains[0] for p in op.parameters}
+        for argument in cast.arguments:
+            if argument.name not in accepted:
+                message = f"no converter from {found} to {cast.representation} has a parameter {quote(argument.name)}"
+                help = did_you_mean(argument.name, accepted)
+                self.reporter.error("LN0103", argument.name_span, message, help=help)
+                return None
+        for op in chains[0]:
+            arguments = tuple(a for a in cast.arguments if op.parameter(a.name))
+            parameters = self._parameters(ast.Call(op.name, (), arguments, cast.span, cast.span), op)
+            if parameters is None:
+                return None
+            last = op is chains[0][-1]
+            node = name if last and name else self._derived(home.name, op.name)
+            origin = "equation" if last and name else "nested"
+            self._add(node, op, (Input(op.ports[0], terms, cast.wire.span),), parameters, origin, home, cast.span)
+            terms = (Term(node, 1.0, cast.span),)
+        return terms
+
+    def _no_single_chain(
+        self, cast: ast.Cast, found: str, chains: list[tuple[Operator, ...]]
+    ) -> tuple[Term, ...] | None:
+        if not chains:
+            message = f"no converter leads from {found} to {cast.representation}"
+            self.reporter.error("LN0201", cast.span, message)
+        elif len(chains) > 1:
+            listed = ", ".join(" then ".join(op.name for op in chain) for chain in chains)
+            message = f"several conversions from {found} to {cast.representation} cost the same: {listed}"
+            self.reporter.error("LN0202", cast.span, message, help="write the one you want as a call")
+        else:
+            message = f"this is {found} already"
+            self.reporter.error("LN0201", cast.span, message, help="remove the conversion")
+        return None
+
+    def _representation(self, wire: ast.WireExpression) -> str | None:
+        """What an expression is, as far as its text says; None if that is wrong, which is reported elsewhere."""
+        if isinstance(wire, ast.WireName):
+            end = self._alias_end(wire.name)
+            if end is None:
+                return None
+            wire = self.equations[end].wire
+        match wire:
+            case ast.Call(op):
+                return self.library.operators[op].output if op in self.library.operators else None
+            case ast.Cast(_, representation):
+                return representation
+        return self.library.operators["Sum"].output
+
+    # --- Small helpers ------------------------------------------------------------------------------------------------
+
+    def _add(
+        self,
+        name: str,
+        op: Operator,
+        inputs: tuple[Input, ...],
+        parameters: tuple[ParameterValue, ...],
+        origin: str,
+        home: _Home,
+        span: Span,
+        annotation: str | None = None,
+    ) -> None:
+        if not parameters:
+            defaults = [parameter_value(p, None, self.tags, self.reporter) for p in op.parameters]
+            parameters = tuple(v for v in defaults if v is not None)
+        self.made.add(name)
+        self.nodes.append(Node(name, op, inputs, parameters, origin, span, home.statement, annotation))
+
+    def _unknown_representation(self, name: str, span: Span) -> None:
+        help = did_you_mean(name, self.library.representations)
+        self.reporter.error("LN0102", span, f"no representation is called {quote(name)}", help=help)
+
+    def _check_tags(self, path: ast.PathExpression) -> None:
+        for name in sorted(tags_in(path) - set(self.tags)):
+            help = did_you_mean(name, self.tags)
+            self.reporter.error("LN0102", path.span, f"no tag is called {quote(name)}", help=help)
+
+    def _twice(self, span: Span, message: str, first: Span, code: str = "LN0106") -> None:
+        self.reporter.error(code, span, message, related=[Related(first, "first here")])
+
+    def _report_unused(self) -> None:
+        if self.reporter.failed:
+            return
+        for name, equation in self.equations.items():
+            if name not in self.used:
+                message = f"nothing uses the wire {quote(name)}"
+                self.reporter.warning("LN0108", equation.name_span, message, help="it is left out of the program")
+
+
+def _declared_here(op: Operator, span: Span) -> Related:
+    return Related(span, f"'{op.name}' is declared here")

@@ -33,7 +33,7 @@ inline Vec3 unpack_unit(std::uint32_t bits) {
 }
 
 /// A non-negative colour in 8 bytes: 18 bits a channel and a shared exponent. The error is at most 2^-19 of the largest
-/// channel; below 2^-140 it becomes 0, from 2^96 on it is clamped.
+/// channel; below 2^-140 it becomes 0, from 2^95 on it is clamped.
 struct PackedColor {
   std::uint32_t low = 0, high = 0;
 
@@ -43,7 +43,7 @@ struct PackedColor {
     const float largest = max_component(c);
     if (!(largest > 0x1p-140f)) return;
     int exponent;
-    std::frexp(std::min(largest, 0x1.fp95f), &exponent);
+    std::frexp(std::min(largest, 0x1.fp94f), &exponent);
     if (std::ldexp(largest, kBits - exponent) + 0.5f >= static_cast<float>(1u << kBits)) ++exponent;
     const auto mantissa = [&](float x) {
       const float steps = std::ldexp(std::max(x, 0.0f), kBits - exponent) + 0.5f;

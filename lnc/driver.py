@@ -1,11 +1,12 @@
 """The spine: the rooms that a network walks through, in order.
 
-    parse -> resolve -> typecheck -> insert_converters -> check_cycles -> contents -> schedule   (-> codegen, build)
-                                                                               \\-> light_paths  (for explain, graph)
+parse -> resolve -> typecheck -> insert_converters -> check_cycles -> contents -> schedule   (-> codegen, build)
+                                                                           \\-> light_paths  (for explain, graph)
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -66,6 +67,22 @@ def read_source(path: str) -> SourceFile:
         line = content[: error.start].count(b"\n") + 1
         raise Unreadable(f"{path}: is not UTF-8 text (line {line})") from error
     return SourceFile(path, text.replace("\r\n", "\n"))
+
+
+def write_text(path: str, text: str) -> None:
+    """Write a whole file or nothing: to a temporary name, then renamed. Raises Unreadable."""
+    target = Path(path)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    try:
+        if target.is_symlink():
+            target = target.resolve()
+        temporary.write_text(text, "utf-8", newline="\n")
+        if target.exists():
+            temporary.chmod(target.stat().st_mode & 0o777)
+        os.replace(temporary, target)
+    except (OSError, ValueError) as error:
+        temporary.unlink(missing_ok=True)
+        raise Unreadable(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from error
 
 
 def compile_network(source: SourceFile, library: Library, dump: Dump | None = None) -> Result:

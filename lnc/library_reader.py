@@ -63,8 +63,8 @@ def read_library(texts: dict[str, str]) -> tuple[Library, list[Diagnostic]]:
                     message = "an operator library holds operators and representations only"
                     reporter.error("LN0112", statement.span, message)
     operators: dict[str, Operator] = {}
-    for path, declaration in declared:
-        operators[declaration.name] = _OperatorReader(declaration, path, representations, reporter).read()
+    for place, declaration in declared:
+        operators[declaration.name] = _OperatorReader(declaration, place, representations, reporter).read()
     return Library(operators, representations), reporter.sorted()
 
 
@@ -91,9 +91,7 @@ class _OperatorReader:
         for name in (declaration.output, *(p.representation for p in declaration.ports)):
             if name not in self.representations:
                 self._error(declaration.name_span, f"'{declaration.name}' uses '{name}', which no file declares")
-        ports = tuple(
-            Port(p.name, p.representation, p.complete, p.variadic, p.doc, p.span) for p in declaration.ports
-        )
+        ports = tuple(Port(p.name, p.representation, p.complete, p.variadic, p.doc, p.span) for p in declaration.ports)
         body = declaration.body
         parameters = tuple(self._parameter(i) for i in body if isinstance(i, ast.ParameterDeclaration))
         converter = next((i for i in body if isinstance(i, ast.ConverterDeclaration)), None)
@@ -102,7 +100,9 @@ class _OperatorReader:
             self._error(recursion.span, "a recursion is bounded by 'roulette' or by 'depth'")
         if converter is not None and len(ports) != 1:
             self._error(converter.span, "a converter has exactly one port")
-        rules = [rule for i in body if isinstance(i, ast.PathsDeclaration) for rule in self._rules(i, ports, parameters)]
+        rules = [
+            rule for i in body if isinstance(i, ast.PathsDeclaration) for rule in self._rules(i, ports, parameters)
+        ]
         if not rules:
             self._error(declaration.name_span, f"'{declaration.name}' does not declare its light paths")
         return Operator(
@@ -211,5 +211,3 @@ class _OperatorReader:
 
     def _error(self, span: Span, message: str) -> None:
         self.reporter.error("LN0112", span, message)
-
-

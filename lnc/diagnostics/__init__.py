@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
-from lnc.source import Span
+from lnc.source import SourceFile, Span
 
 
 class InternalError(Exception):
@@ -69,6 +69,11 @@ class Reporter:
         files = {d.span.source.name: None for d in self.diagnostics}
         order = {name: i for i, name in enumerate(files)}
         return sorted(self.diagnostics, key=lambda d: (order[d.span.source.name], d.span.start, d.span.end, d.code))
+
+
+def unreadable(path: str, message: str) -> Diagnostic:
+    """A file that could not be read, as a diagnostic."""
+    return Diagnostic("LN0100", "error", message, Span(SourceFile(path, ""), 0, 0))
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str | None:

@@ -138,7 +138,11 @@ class _Inserter:
     def _bridge(self, found: str, wanted: str) -> str | None:
         """An operator that is no converter but takes what there is and gives what is wanted."""
         for op in sorted(self.library.operators.values(), key=lambda o: o.name):
-            if op.output == wanted and op.ports and len(cheapest_chains(self.library, found, op.ports[0].representation)):
+            if (
+                op.output == wanted
+                and op.ports
+                and len(cheapest_chains(self.library, found, op.ports[0].representation))
+            ):
                 return f"{op.name}(...) makes {wanted} from {found}"
         return None
 

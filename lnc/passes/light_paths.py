@@ -122,14 +122,13 @@ class _NetworkAutomaton:
     def _tail(self, node: Node, rule: PathRule, target: str, source: int, content: str, letters: int) -> None:
         """The events of a rule behind `source`; the first of them is one of `letters` that `content` can scatter by."""
         receivers = self.alphabet.events("DGS", self._tagged(node, "to"))
-        tail = self._filled(node, rule.tail)
-        if tail is None:
+        if rule.tail is None:
             left = letters & receivers
             if left:
                 self.nfa.skip(source, self._state(node.name, target, left))
             return
         part = Nfa()
-        end = add_path(part, tail, 0, self.alphabet)
+        end = add_path(part, self._filled(node, rule.tail), 0, self.alphabet)
         part.accepting = {end}
         dfa = determinise(part)
         first = first_tag_parameter(rule.tail)
@@ -149,18 +148,16 @@ class _NetworkAutomaton:
         if dfa.accepting[0] and letters & receivers:
             self.nfa.skip(begin, self._state(node.name, target, letters & receivers))
 
-    def _filled(self, node: Node, tail: ast.PathExpression | None) -> ast.PathExpression | None:
+    def _filled(self, node: Node, tail: ast.PathExpression) -> ast.PathExpression:
         """The tail with path parameters replaced by their values."""
         match tail:
             case ast.PathName(name):
                 value = node.parameter(name)
                 return value.value.expression if value and isinstance(value.value, PathValue) else tail
-            case ast.PathConcat(items):
-                return replace(tail, items=tuple(self._filled(node, i) for i in items))  # type: ignore[arg-type]
-            case ast.PathUnion(items):
-                return replace(tail, items=tuple(self._filled(node, i) for i in items))  # type: ignore[arg-type]
+            case ast.PathConcat(items) | ast.PathUnion(items):
+                return replace(tail, items=tuple(self._filled(node, i) for i in items))
             case ast.PathRepeat(item):
-                return replace(tail, item=self._filled(node, item))  # type: ignore[arg-type]
+                return replace(tail, item=self._filled(node, item))
         return tail
 
     # --- Languages ----------------------------------------------------------------------------------------------------

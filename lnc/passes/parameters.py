@@ -45,9 +45,7 @@ def parameter_value(
         return None
 
 
-def _convert(
-    parameter: Parameter, value: ast.Value, tags: Collection[str], reporter: Reporter
-) -> Scalar | PathValue:
+def _convert(parameter: Parameter, value: ast.Value, tags: Collection[str], reporter: Reporter) -> Scalar | PathValue:
     match parameter.type, value:
         case kind, ast.NumberValue(text) if kind in UNITS:
             return _in_range(parameter, number(text, kind), text)
@@ -61,7 +59,7 @@ def _convert(
             return text
         case "tags", ast.NameValue(name):
             if name not in tags:
-                help = did_you_mean(name, tags) or f"define it: tag {name} = material \"...\""
+                help = did_you_mean(name, tags) or f'define it: tag {name} = material "..."'
                 reporter.error("LN0102", value.span, f"no tag is called {quote(name)}", help=help)
                 raise ValueFault("")
             return name
@@ -97,9 +95,7 @@ def _letters_or_tag(name: str, span: Span) -> ast.PathExpression:
     return ast.PathName(name, None, span)
 
 
-def _path(
-    parameter: Parameter, path: ast.PathExpression, tags: Collection[str], reporter: Reporter
-) -> PathValue:
+def _path(parameter: Parameter, path: ast.PathExpression, tags: Collection[str], reporter: Reporter) -> PathValue:
     used = tags_in(path)
     unknown = sorted(used - set(tags))
     if unknown:

@@ -232,8 +232,13 @@ class Renderer:
                     found = eliminate(candidate, order)
                     found = mirrored(found) if backwards else found
                     text = self._write(found, "alt")
-                    best = min(best, (_score(found), text), key=lambda b: (b[0], len(b[1]), b[1]))
+                    best = min(best, (self._score(found), text), key=lambda b: (b[0], len(b[1]), b[1]))
         return best
+
+    def _score(self, e: Expr) -> int:
+        if e.kind == "leaf":
+            return len(self.letter_names(e.letters))
+        return (e.kind in ("star", "plus")) + sum(map(self._score, e.items))
 
     def _write(self, e: Expr, within: str) -> str:
         match e.kind:
@@ -308,10 +313,6 @@ def mirrored(e: Expr) -> Expr:
     if e.kind == "alt":
         return alt(*items)
     return replace(e, items=items)
-
-
-def _score(e: Expr) -> int:
-    return (e.kind in ("leaf", "star", "plus", "opt")) + sum(map(_score, e.items))
 
 
 def _by_degree(dfa: Dfa) -> list[int]:

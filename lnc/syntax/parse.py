@@ -144,7 +144,9 @@ class _Parser:
             values, extent = [], (token.start, token.start)
         children: list[Any] = []
         for value, keep in zip(values, rule.keep, strict=True):
-            if type(value) is list:  # of a rule whose name begins with _: extend in place, or growing lists cost squares
+            if (
+                type(value) is list
+            ):  # of a rule whose name begins with _: extend in place, or growing lists cost squares
                 if children:
                     children.extend(value)
                 else:
@@ -202,7 +204,7 @@ class _Parser:
         message = f"{self._describe(token)} cannot stand here"
         if expected:
             message = f"expected {expected}, found {self._describe(token)}"
-        related = ()
+        related: tuple[Related, ...] = ()
         if bracket is not None and self.source.line_column(bracket.start)[0] != span.line:
             opened = Span(self.source, bracket.start, bracket.end)
             related = (Related(opened, f"inside this '{bracket.text}'"),)

@@ -1,0 +1,167 @@
+"""The catalogue: every code with its page, and the smallest network that provokes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Page:
+    """What `lnc explain CODE` prints. `example` is None where no text of a network can provoke the code."""
+
+    code: str
+    title: str
+    text: str
+    example: str | None
+
+
+def page(code: str) -> Page | None:
+    return PAGES.get(code.upper())
+
+
+def _pages(*pages: Page) -> dict[str, Page]:
+    return {p.code: p for p in pages}
+
+
+PAGES = _pages(
+    Page(
+        "LN0100",
+        "unreadable file",
+        """The file is missing, is not UTF-8 text, or is larger than any network. The exit status is 2.""",
+        None,
+    ),
+    Page(
+        "LN0101",
+        "syntax",
+        """The text cannot be read here. The statement is skipped and the next one is read as if nothing had
+happened, so one run shows every such place. A statement ends with its line; it goes on inside ( )
+and [ ], and on a line that begins with | + - -> or a comma. The letters L D G S E are events of
+light paths and cannot be names by themselves.""",
+        "light = Lights(\nimage Direct(light)\n",
+    ),
+    Page(
+        "LN0102",
+        "unknown name",
+        """No wire, operator, tag, representation or kind of tag has this name. The message suggests the
+closest one there is. `lnc ops` lists the operators.""",
+        "light = Lights()\nimage Direct(ligth)\n",
+    ),
+    Page(
+        "LN0103",
+        "unknown parameter",
+        """The operator has no parameter and no port of this name. `lnc ops NAME` lists what it has.""",
+        "light = Lights()\nimage Direct(light, sampels = 4)\n",
+    ),
+    Page(
+        "LN0104",
+        "value, unit or range",
+        """The value is of another kind than the parameter, has a wrong unit or none, or lies outside of the
+range. Counts take k, M and G; ratios %; lengths m, km, cm, mm, um; angles deg, rad; times s, ms,
+min, h. Lengths, angles and times always need a unit, except 0.""",
+        "light = Lights()\nimage Direct(light, samples = 5cm)\n",
+    ),
+    Page(
+        "LN0105",
+        "input missing",
+        """A port of the operator is not connected, or a parameter without a default is not given. Ports are
+given by position, or by name with a single wire: PathTracer(in = direct).""",
+        "image Direct(samples = 4)\n",
+    ),
+    Page(
+        "LN0106",
+        "defined twice",
+        """A wire, a tag, the image or the network's name is defined a second time. Order does not matter in a
+network, so neither can replace the other.""",
+        "light = Lights()\nlight = Lights()\nimage Direct(light)\n",
+    ),
+    Page(
+        "LN0107",
+        "too many inputs",
+        """More wires are given by position than the operator has ports, or one input or parameter is given
+twice. Parameters are always given by name.""",
+        "light = Lights()\nimage Direct(light, light)\n",
+    ),
+    Page(
+        "LN0108",
+        "unused wire",
+        """Nothing uses this wire, so the program leaves it out. This is a warning.""",
+        "light = Lights()\nspare = Direct(light)\nimage Direct(light)\n",
+    ),
+    Page(
+        "LN0109",
+        "no result",
+        """The network has neither an `image` nor a `tap`, so there is nothing to compute.""",
+        "light = Lights()\n",
+    ),
+    Page(
+        "LN0110",
+        "not supported",
+        """The statement is part of the language, but this version cannot compile it, or not in this place.""",
+        'light = Lights()\nlightmap Direct(light) -> "walls.gltf"\n',
+    ),
+    Page(
+        "LN0111",
+        "macro",
+        """A macro
+is wrong: it lacks its result `out`, uses itself, or its input has no default and is not given. A
+mistake inside a macro is shown in its text, with the call that led there.""",
+        "op Twice(in: Points) -> Points {\n    out = Twice(in)\n}\nimage Twice(Direct(Lights()))\n",
+    ),
+    Page(
+        "LN0112",
+        "wrong declaration",
+        """A declaration in an operator library is wrong: an unknown type, a default that does not fit, light
+paths that name no port, or a file that is not named after its operator. ops_library/README.md says
+how to write one.""",
+        None,
+    ),
+    Page(
+        "LN0201",
+        "no conversion",
+        """A port takes another representation than the wire has, and no chain of converters leads from one to
+the other. Only operators that declare `converter` are inserted; an estimate such as NNDensity,
+whose quality is a choice, never is.""",
+        "light = Lights()\nimage light\n",
+    ),
+    Page(
+        "LN0202",
+        "ambiguous conversion",
+        """Several chains of converters cost the same. There is no silent choice: write the one that you want
+as a call.""",
+        None,
+    ),
+    Page(
+        "LN0305",
+        "event that this content cannot scatter",
+        """A `via` begins with an event that the light at the port cannot be scattered by. Irradiance has no
+directions, so a surface can scatter it by D alone. Samples come from directions of their own
+choice: D and G, for S asks for one exact direction. Radiance can be scattered by all.""",
+        """light = Lights() photons = ParticleTracer(light) soft = NNDensity(photons) image PathTracer(soft,
+via = S) """,
+    ),
+    Page(
+        "LN0401",
+        "preprocessing cycle",
+        """An operator that works before the picture
+needs its own result. The message prints the loop hop by hop. Break it: a pulled cycle (PathTracer)
+is allowed, one through an operator that must be complete first is not.""",
+        None,
+    ),
+    Page(
+        "LN0402",
+        "unbounded recursion",
+        """A cycle of pulls without an operator that ends it. PathTracer ends recursions by Russian roulette;
+sums and scales alone add no event and would never end.""",
+        "light  = Lights()\ndirect = Direct(light)\nloop   = Scale(direct + loop, factor = 0.5)\nimage  loop\n",
+    ),
+    Page(
+        "LN0502",
+        "too many tags",
+        """Every combination of the tags that from, to and via name is told apart. Six tags make 64
+combinations; more are not supported.""",
+        "".join(f'tag t{i} = material "m{i}"\n' for i in range(7))
+        + "light = Lights()\nimage "
+        + " + ".join(f"Direct(light, to = t{i})" for i in range(7))
+        + "\n",
+    ),
+)

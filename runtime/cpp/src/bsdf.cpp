@@ -51,7 +51,7 @@ struct Bsdf::Interface {
 /// What depends on wo alone: albedos, and the probabilities of the lobes in the mask.
 struct Bsdf::View {
   FacetAlbedo facets;
-  Color layer{0};          // albedo of the specular layer above the diffuse base
+  Color below{0};          // share that the specular layer lets through to the diffuse base
   Color solid_deficit{0};
   float reach = 0;         // Ggx::reach(wo.z)
   float cap_share = 1;
@@ -93,7 +93,7 @@ Bsdf::Bsdf(const BsdfParameters& p, bool outside, const DielectricTable* table) 
   }
 
   // The diffuse base gets what the layer lets through.
-  const Color entering = 1.0f - layer_albedo(average);
+  const Color entering = below_layer(average);
   for (int c = 0; c < 3; c++) {
     base_[c] = entering[c] > 1e-6f ? opaque * base[c] : 0;
     diffuse_[c] = base_[c] > 0 ? base_[c] * kInvPi / entering[c] : 0;
@@ -148,8 +148,8 @@ FacetAlbedo Bsdf::facets(float cosine) const {
   return rough_ ? albedo_table::facets(row_, alpha_, cosine) : FacetAlbedo{0, schlick_weight(cosine)};
 }
 
-Color Bsdf::layer_albedo(const FacetAlbedo& f) const {
-  return layer_f0_ * (1 - f.deficit - f.schlick) + layer_f90_ * f.schlick + layer_multiple_ * f.deficit;
+Color Bsdf::below_layer(const FacetAlbedo& f) const {
+  return positive(1.0f - (layer_f0_ * (1 - f.deficit - f.schlick) + layer_f90_ * f.schlick + layer_multiple_ * f.deficit));
 }
 
 Color Bsdf::solid_deficit(float cosine, bool side_of_wo) const {
@@ -168,9 +168,9 @@ Bsdf::Interface Bsdf::at_interface(float cosine) const {
 Bsdf::View Bsdf::view(const Vec3& wo, Events mask) const {
   View v;
   v.facets = facets(wo.z);
-  v.layer = layer_albedo(v.facets);
+  v.below = below_layer(v.facets);
   float diffuse = 0, facet = 0, up = 0, down = 0;
-  if (any(mask & events_ & Events::D)) diffuse = mean_component(base_ * (1.0f - v.layer));
+  if (any(mask & events_ & Events::D)) diffuse = mean_component(base_ * v.below);
   if (any(mask & events_ & (Events::G | Events::S))) {
     const FacetAlbedo& f = v.facets;
     facet = mean_component(facet_f0_) * (1 - f.deficit - f.schlick) + facet_f90_ * f.schlick;
@@ -209,7 +209,7 @@ BsdfValue Bsdf::evaluate_smooth(const View& v, const Vec3& wo, const Vec3& wi, E
   if (wi.z > 0) {
     const FacetAlbedo at_wi = kValue ? facets(wi.z) : FacetAlbedo{};
     if (any(mask & events_ & Events::D)) {
-      if (kValue) result.f_cos += diffuse_ * (1.0f - v.layer) * (1.0f - layer_albedo(at_wi)) * wi.z;
+      if (kValue) result.f_cos += diffuse_ * v.below * below_layer(at_wi) * wi.z;
       if (kDensity) result.pdf_w += v.p_diffuse * wi.z * kInvPi;
     }
     if (!glossy) return result;
@@ -335,12 +335,12 @@ bool Bsdf::layered_sample(const Vec3& wo, float u_lobe, const Vec2& u, Events ma
   return true;
 }
 
-Color Bsdf::layered_diffuse_reflectance(const Vec3& wo) const { return base_ * (1.0f - layer_albedo(facets(wo.z))); }
+Color Bsdf::layered_diffuse_reflectance(const Vec3& wo) const { return base_ * below_layer(facets(wo.z)); }
 
 Color Bsdf::layered_albedo(const Vec3& wo, Events mask) const {
   const FacetAlbedo f = facets(wo.z);
   Color sum{0};
-  if (any(mask & events_ & Events::D)) sum += base_ * (1.0f - layer_albedo(f));
+  if (any(mask & events_ & Events::D)) sum += base_ * below_layer(f);
   if (!any(mask & events_ & (Events::G | Events::S))) return sum;
   sum += facet_f0_ * (1 - f.deficit - f.schlick) + facet_f90_ * f.schlick + multiple_up_ * f.deficit;
   if (wall_ == Wall::opaque) return sum;

@@ -1,6 +1,5 @@
 #include "ln/dielectric_table.hpp"
 
-#include "ln/fresnel.hpp"
 #include "ln/microfacet.hpp"
 
 namespace ln {
@@ -86,7 +85,7 @@ DielectricTable::DielectricTable(float ior, float min_roughness, float max_rough
           const float middle = 0.5f * (low + high);
           (column(alpha, middle) < target ? low : high) = middle;
         }
-        const Vec2 d = integrate(eta < 1 ? broken : smooth, std::max(high, 1e-7f), alpha, eta);
+        const Vec2 d = glm::max(integrate(eta < 1 ? broken : smooth, std::max(high, 1e-7f), alpha, eta), Vec2(0));
         deficit_[outside][row].values[i][0] = d.x;
         deficit_[outside][row].values[i][1] = d.y;
       }

@@ -18,7 +18,7 @@ double reach(double alpha, double z) { return std::sqrt(alpha * alpha + (1 - alp
 
 /// Single-bounce albedo of GGX for the cosine `mu`.
 Albedo integrate(double mu, double alpha) {
-  constexpr int kSteps = 96;
+  constexpr int kSteps = 64;
   const double sine = std::sqrt(std::max(0.0, 1 - mu * mu));
   const double length = std::hypot(alpha * sine, mu);
   const double vx = alpha * sine / length, vz = mu / length;
@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
     const auto shift_at = [&](double u) { return shift(integrate(cosine_of(u, alpha), alpha), cosine_of(u, alpha), alpha); };
     for (int column = 0; column < kColumns; column++) {
       const double cell = 1 / (kColumns - 1.0), u = column * cell;
-      facet_table[row][column][0] = static_cast<float>(integrate(cosine_of(u, alpha), alpha).deficit);
+      facet_table[row][column][0] = static_cast<float>(std::max(integrate(cosine_of(u, alpha), alpha).deficit, 0.0));
       // At normal incidence hardly anything depends on the shift, in the rest of the last cell much does: extrapolate.
       facet_table[row][column][1] = static_cast<float>(column < kColumns - 1 ? shift_at(u) : 2 * shift_at(1 - cell / 2) - shift_at(1 - cell));
     }

@@ -138,7 +138,7 @@ class Bsdf {
   View view(const Vec3& wo, Events mask) const;
   Interface at_interface(float cosine) const;
   FacetAlbedo facets(float cosine) const;
-  Color layer_albedo(const FacetAlbedo& facets) const;
+  Color below_layer(const FacetAlbedo& facets) const;
   Color solid_deficit(float cosine, bool side_of_wo) const;
 
   Kind kind_ = Kind::black;

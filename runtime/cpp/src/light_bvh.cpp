@@ -31,13 +31,10 @@ struct Summary {
   /// Power times spread in space times spread in direction (Conty & Kulla 2018, eq. 1 and 2).
   double cost() const {
     if (count == 0 || phi <= 0) return 0;
-    // Normals spread evenly over a cap of angle theta_o have a mean of length (1 + cos(theta_o)) / 2.
-    const float cos_o = std::clamp(2 * glm::length(axes) / static_cast<float>(phi) - 1, -1.0f, 1.0f);
-    const float theta_o = std::acos(cos_o), sin_o = safe_sqrt(1 - cos_o * cos_o);
-    const float theta_w = std::min(theta_o + 0.5f * kPi, kPi);
-    const float spread = 2 * kPi * (1 - cos_o) +
-                         0.5f * kPi * (2 * theta_w * sin_o - std::cos(theta_o - 2 * theta_w) - 2 * theta_o * sin_o + cos_o);
-    return phi * spread * box.diagonal2();
+    // Normals spread evenly over a cap of half angle theta_o have a mean of length r = (1 + cos(theta_o)) / 2. The
+    // paper's measure of a cone with theta_e = 90 degrees then is pi for r = 1 and 4 pi for r = 0; a fit in between.
+    const double r = std::min(glm::length(glm::dvec3(axes)) / phi, 1.0);
+    return phi * (4 - 3 * r * r * r) * box.diagonal2();
   }
 };
 
@@ -73,7 +70,12 @@ class Builder {
 
   /// Divides a range into at most LightBvh::kWidth, always the costliest first.
   std::vector<Range> divide(std::uint32_t begin, std::uint32_t end, bool by_median) {
-    std::vector<Range> parts{range(begin, end)};
+    std::vector<Range> parts;
+    if (end - begin <= LightBvh::kWidth) {
+      for (std::uint32_t i = begin; i < end; ++i) parts.push_back({i, i + 1, 0});
+      return parts;
+    }
+    parts.push_back(range(begin, end));
     while (parts.size() < LightBvh::kWidth) {
       std::size_t best = parts.size();
       for (std::size_t i = 0; i < parts.size(); ++i) {

@@ -12,7 +12,7 @@ namespace {
 
 void check_memory(int width, int height, int layer_count) {
   const std::uint64_t needed = Film::bytes_needed(width, height, layer_count);
-  const std::uint64_t available = available_memory_bytes();
+  const std::uint64_t available = available_memory_bytes() / 5 * 4;  // others live here too
   if (needed <= available) return;
   throw Error("a picture of " + std::to_string(width) + "x" + std::to_string(height) + " with " + std::to_string(layer_count) +
               " layers needs " + bytes_text(static_cast<double>(needed)) + " of memory, this machine has " + bytes_text(static_cast<double>(available)) +

@@ -40,10 +40,10 @@ struct Unit {
 
 constexpr std::array kCountUnits{Unit{"", 1}, Unit{"k", 1e3}, Unit{"M", 1e6}, Unit{"G", 1e9}};
 constexpr std::array kRatioUnits{Unit{"", 1}, Unit{"%", 0.01}};
-constexpr std::array kLengthUnits{Unit{"", 1}, Unit{"m", 1}, Unit{"cm", 0.01}, Unit{"mm", 1e-3}, Unit{"um", 1e-6}, Unit{"km", 1e3}};
+// The same as in the language: lengths, angles and times need a unit there, and so they do in --set.
+constexpr std::array kLengthUnits{Unit{"m", 1}, Unit{"cm", 0.01}, Unit{"mm", 1e-3}, Unit{"um", 1e-6}, Unit{"km", 1e3}};
 constexpr std::array kAngleUnits{Unit{"deg", 3.14159265358979323846 / 180}, Unit{"rad", 1}};
-constexpr std::array kTimeUnits{Unit{"", 1}, Unit{"s", 1}, Unit{"ms", 1e-3}, Unit{"min", 60}, Unit{"h", 3600}};
-constexpr std::array kNumberUnits{Unit{"", 1}};
+constexpr std::array kTimeUnits{Unit{"s", 1}, Unit{"ms", 1e-3}, Unit{"min", 60}, Unit{"h", 3600}};
 
 std::span<const Unit> units_of(ParameterKind kind) {
   switch (kind) {
@@ -52,7 +52,7 @@ std::span<const Unit> units_of(ParameterKind kind) {
     case ParameterKind::length: return kLengthUnits;
     case ParameterKind::angle: return kAngleUnits;
     case ParameterKind::time: return kTimeUnits;
-    default: return kNumberUnits;
+    default: return kCountUnits;
   }
 }
 
@@ -60,9 +60,9 @@ const char* examples_of(ParameterKind kind) {
   switch (kind) {
     case ParameterKind::count: return "a whole number such as 64 or 200k";
     case ParameterKind::ratio: return "a ratio such as 0.01 or 1%";
-    case ParameterKind::length: return "a length such as 5cm or 0.05 (metres)";
+    case ParameterKind::length: return "a length such as 5cm or 1.5m";
     case ParameterKind::angle: return "an angle such as 30deg or 0.5rad";
-    case ParameterKind::time: return "a time such as 10 (seconds), 500ms or 2min";
+    case ParameterKind::time: return "a time such as 10s, 500ms or 2min";
     case ParameterKind::number: return "a number such as 0.5";
     case ParameterKind::flag: return "true or false";
     case ParameterKind::choice: return "one of its names";
@@ -95,8 +95,7 @@ double parse_quantity(std::string_view name, ParameterKind kind, std::string_vie
   for (const Unit& candidate : units_of(kind)) {
     if (candidate.name == unit) return *number * candidate.factor;
   }
-  if (kind == ParameterKind::angle && unit.empty() && *number == 0) return 0;
-  if (kind == ParameterKind::angle && unit.empty()) throw UsageError(std::string(name) + " needs a unit: " + std::string(text) + "deg or " + std::string(text) + "rad");
+  if (unit.empty() && *number == 0) return 0;
   refuse(name, examples_of(kind), text);
 }
 
@@ -147,6 +146,7 @@ double shortest(float value) {
 }
 
 std::string range_text(const ParameterSlot& slot) {
+  if (slot.kind == ParameterKind::flag || slot.kind == ParameterKind::text) return "";
   const bool above = std::isfinite(slot.minimum), below = std::isfinite(slot.maximum);
   if (above && below) return "between " + quantity_text(slot.kind, slot.minimum) + " and " + quantity_text(slot.kind, slot.maximum);
   if (above) return "at least " + quantity_text(slot.kind, slot.minimum);
@@ -201,10 +201,16 @@ std::int64_t parse_whole(std::string_view option, std::string_view text, std::in
   return value;
 }
 
-double parse_positive(std::string_view option, ParameterKind kind, std::string_view text, double most) {
-  const double value = parse_quantity(option, kind, text);
-  if (!(value > 0) || value > most) refuse(option, std::string(examples_of(kind)) + ", above 0 and at most " + quantity_text(kind, most), text);
+double require_positive(std::string_view option, double value, std::string_view text) {
+  if (!(value > 0)) refuse(option, "above 0", text);
   return value;
+}
+
+/// Seconds; a plain number is one already.
+double parse_time_limit(std::string_view text) {
+  std::string_view unit;
+  const std::optional<double> plain = parse_decimal(text, unit);
+  return require_positive("--time", plain && unit.empty() ? *plain : parse_quantity("--time", ParameterKind::time, text), text);
 }
 
 std::uint64_t parse_seed(std::string_view text) {
@@ -308,6 +314,11 @@ std::string parameters_help(const ProgramInfo& program) {
   return text;
 }
 
+std::string replaced(std::string text, std::string_view before, std::string_view after) {
+  if (const std::size_t at = text.find(before); at != std::string::npos) text.replace(at, before.size(), after);
+  return text;
+}
+
 /// The texts of all options as they were given.
 struct RawOptions {
   std::string scene, output, size, camera, samples, time, error, seed, threads, stats, progress, preview, environment, units;
@@ -334,7 +345,7 @@ void declare_options(CLI::App& app, RawOptions& raw) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   add("--stats", raw.stats, "FILE.json", "write times, rays and memory");
   add("--progress", raw.progress, "HOW", "auto, plain, json or none (default: auto)");
-  add("--preview", raw.preview, "FILE.png", "write a small-range picture every few seconds and at the end");
+  add("--preview", raw.preview, "FILE.png", "write a tone-mapped picture every few seconds and at the end");
   add("--env", raw.environment, "FILE.hdr", "environment map that lights the scene");
   add("--units", raw.units, "UNITS", "radiometric or photometric (default: radiometric)");
   app.add_flag("--version", raw.version, "print the version and exit");
@@ -380,8 +391,8 @@ void refuse_other_format(std::string_view path) {
 }  // namespace
 
 std::string nearest_word(std::string_view word, const std::vector<std::string>& candidates) {
-  constexpr std::size_t kLongest = 64;
-  if (word.size() > kLongest) return "";
+  constexpr std::size_t kShortest = 3, kLongest = 64;  // anything is near to a shorter word
+  if (word.size() < kShortest || word.size() > kLongest) return "";
   std::string nearest;
   std::size_t least = std::max<std::size_t>(word.size() / 3, 1) + 1;
   for (const std::string& candidate : candidates) {
@@ -454,12 +465,14 @@ Options parse_options(int argc, const char* const* argv, const ProgramInfo& prog
     for (int i = argc - 1; i > 0; --i) arguments.emplace_back(argv[i]);  // CLI11 takes them from the back
     app.parse(std::move(arguments));
   } catch (const CLI::CallForHelp&) {
-    throw HelpRequest{app.help()};
+    throw HelpRequest{replaced(app.help(), "[OPTIONS] [SCENE]", "SCENE [OPTIONS]")};
   } catch (const CLI::ParseError& error) {
     refuse_parse(error);
   }
   if (raw.version) throw HelpRequest{"lighting network '" + std::string(program.network) + "', runtime " LN_VERSION "\n"};
-  if (const std::vector<std::string> extras = app.remaining(); !extras.empty()) refuse_extra(extras.front(), app);
+  for (const std::string& extra : app.remaining()) {
+    if (extra != "--") refuse_extra(extra, app);
+  }
   for (const CLI::Option* option : app.get_options()) {
     if (option->count() > 0 && option->get_expected_max() > 0 && option->results().back().empty()) {
       throw UsageError(option->get_name() + " needs a value; see --help");
@@ -474,8 +487,8 @@ Options parse_options(int argc, const char* const* argv, const ProgramInfo& prog
   if (!raw.size.empty()) parse_size(raw.size, options);
   options.camera = raw.camera;
   if (!raw.samples.empty()) options.samples = static_cast<std::uint32_t>(parse_whole("--samples", raw.samples, 1, kMostSamples));
-  if (!raw.time.empty()) options.time = parse_positive("--time", ParameterKind::time, raw.time, 1e9);
-  if (!raw.error.empty()) options.error = parse_positive("--error", ParameterKind::ratio, raw.error, 1);
+  if (!raw.time.empty()) options.time = parse_time_limit(raw.time);
+  if (!raw.error.empty()) options.error = require_positive("--error", parse_quantity("--error", ParameterKind::ratio, raw.error), raw.error);
   if (!options.samples && !options.time && !options.error) options.samples = kDefaultSamples;
   if (!raw.seed.empty()) options.seed = parse_seed(raw.seed);
   options.threads = raw.threads.empty() ? available_processors() : static_cast<int>(parse_whole("--threads", raw.threads, 1, kMostThreads));

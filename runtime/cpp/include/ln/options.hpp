@@ -1,5 +1,5 @@
 #pragma once
-// The command line of a compiled network (the contract is in docs/program.md).
+// The command line of a compiled network.
 
 #include <cstdint>
 #include <optional>
@@ -58,9 +58,9 @@ struct PictureSize {
 PictureSize picture_size(const Options& options, float aspect);
 
 /// Stores "value" into the slot after checking unit and range; throws UsageError.
-///   count   200000, 200k, 1.5M, 2G         ratio  0.01, 1%            length  5cm, 2mm, 0.05 (metres), 1km, 3um
-///   angle   30deg, 0.5rad (a unit is needed unless 0)                 time    2, 2s, 50ms, 1min, 1h (plain: seconds)
-///   number  0.5, -1e-3     flag  true, false, yes, no, on, off, 1, 0  choice  one of its names    text  anything
+///   count   200000, 200k, 1.5M, 2G    number  0.5, -1e-3, 2k    ratio   0.01, 1%
+///   length  5cm, 2mm, 1.5m, 1km, 3um  angle   30deg, 0.5rad     time    2s, 50ms, 1min, 1h    (these need a unit unless 0)
+///   flag    true, false, yes, no, on, off, 1, 0                 choice  one of its names      text  anything
 void set_parameter(const ParameterSlot& slot, std::string_view value);
 
 /// The slot's present value as one would write it ("200k", "1%", "5cm", "30deg", "true").

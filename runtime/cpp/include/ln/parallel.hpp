@@ -21,15 +21,28 @@ class FunctionRef<Result(Arguments...)> {
  public:
   template <class F>
     requires(!std::is_same_v<std::remove_cvref_t<F>, FunctionRef> && std::is_invocable_r_v<Result, F&, Arguments...>)
-  FunctionRef(F&& function)  // implicit on purpose: pass a lambda
-      : object_(const_cast<void*>(static_cast<const void*>(std::addressof(function)))),
-        call_([](void* object, Arguments... arguments) -> Result {
-          return (*static_cast<std::remove_reference_t<F>*>(object))(std::forward<Arguments>(arguments)...);
+  FunctionRef(F&& function)  // implicit on purpose: pass a lambda or a function
+      : object_(address(function)), call_([](void* object, Arguments... arguments) -> Result {
+          using Pointer = std::add_pointer_t<std::remove_reference_t<F>>;
+          if constexpr (std::is_function_v<std::remove_reference_t<F>>) {
+            return reinterpret_cast<Pointer>(object)(std::forward<Arguments>(arguments)...);
+          } else {
+            return (*static_cast<Pointer>(object))(std::forward<Arguments>(arguments)...);
+          }
         }) {}
 
   Result operator()(Arguments... arguments) const { return call_(object_, std::forward<Arguments>(arguments)...); }
 
  private:
+  template <class F>
+  static void* address(F& function) {
+    if constexpr (std::is_function_v<F>) {
+      return reinterpret_cast<void*>(&function);
+    } else {
+      return const_cast<void*>(static_cast<const void*>(std::addressof(function)));
+    }
+  }
+
   void* object_;
   Result (*call_)(void*, Arguments...);
 };

@@ -1,5 +1,7 @@
 #include "gltf_accessor.hpp"
 
+#include <limits>
+
 #include "ln/text.hpp"
 
 namespace ln::gltf {
@@ -36,7 +38,7 @@ ByteView place(const Model& model, Json at, std::string_view member, std::size_t
 }  // namespace
 
 Accessor::Accessor(const Model& model, std::size_t index) : json_(model.accessors[index]) {
-  count_ = static_cast<std::size_t>(json_["count"].integer(0));
+  count_ = json_["count"].index();
   type_ = static_cast<ComponentType>(json_["componentType"].integer(0));
   normalized_ = json_["normalized"].boolean(false);
   components_ = component_count(type());
@@ -51,7 +53,7 @@ void Accessor::place_dense(const Model& model) {
   const Json view = json_["bufferView"];
   stride_ = element_bytes_;
   if (!view) return;
-  const auto view_index = static_cast<std::size_t>(view.integer(0));
+  const auto view_index = view.index();
   const Json stride = model.buffer_views[view_index]["byteStride"];
   stride_ = static_cast<std::size_t>(stride.integer(static_cast<std::int64_t>(element_bytes_)));
   if (stride_ < element_bytes_) stride.fail(std::to_string(stride_) + " is less than the " + std::to_string(element_bytes_) + " bytes of an element of " + json_.path());
@@ -61,10 +63,10 @@ void Accessor::place_dense(const Model& model) {
 void Accessor::place_sparse(const Model& model) {
   const Json sparse = json_["sparse"];
   if (!sparse) return;
-  const auto view_of = [](Json json) { return static_cast<std::size_t>(json["bufferView"].integer(0)); };
+  const auto view_of = [](Json json) { return json["bufferView"].index(); };
   const auto offset_of = [](Json json) { return static_cast<std::uint64_t>(json["byteOffset"].integer(0)); };
   const Json indices = sparse["indices"], values = sparse["values"];
-  sparse_count_ = static_cast<std::size_t>(sparse["count"].integer(0));
+  sparse_count_ = sparse["count"].index();
   if (sparse_count_ > count_) sparse.fail("count", std::to_string(sparse_count_) + " is more than the " + std::to_string(count_) + " elements of the accessor");
   sparse_type_ = static_cast<ComponentType>(indices["componentType"].integer(0));
   const std::size_t index_bytes = component_bytes(sparse_type_);
@@ -72,20 +74,10 @@ void Accessor::place_sparse(const Model& model) {
   sparse_values_ = place(model, values, "bufferView", view_of(values), offset_of(values), sparse_count_, element_bytes_, element_bytes_);
 }
 
-double Accessor::component(const ByteView& bytes, ComponentType type, std::size_t offset) const {
-  switch (type) {
-    case ComponentType::i8: return bytes.load<std::int8_t>(offset);
-    case ComponentType::u8: return bytes.load<std::uint8_t>(offset);
-    case ComponentType::i16: return bytes.load<std::int16_t>(offset);
-    case ComponentType::u16: return bytes.load<std::uint16_t>(offset);
-    case ComponentType::u32: return bytes.load<std::uint32_t>(offset);
-    case ComponentType::f32: return static_cast<double>(bytes.load<float>(offset));
-  }
-  return 0;
-}
-
 std::uint64_t Accessor::sparse_index(std::size_t i) const {
-  return static_cast<std::uint64_t>(component(sparse_indices_, sparse_type_, i * component_bytes(sparse_type_)));
+  if (sparse_type_ == ComponentType::u8) return sparse_indices_.load<std::uint8_t>(i);
+  if (sparse_type_ == ComponentType::u16) return sparse_indices_.load<std::uint16_t>(i * 2);
+  return sparse_indices_.load<std::uint32_t>(i * 4);
 }
 
 void Accessor::read(std::size_t i, double* out) const {
@@ -112,16 +104,30 @@ void Accessor::read(std::size_t i, double* out) const {
     std::fill_n(out, components_, 0.0);
     return;
   }
+  switch (type_) {
+    case ComponentType::i8: return read_as<std::int8_t>(*bytes, offset, out);
+    case ComponentType::u8: return read_as<std::uint8_t>(*bytes, offset, out);
+    case ComponentType::i16: return read_as<std::int16_t>(*bytes, offset, out);
+    case ComponentType::u16: return read_as<std::uint16_t>(*bytes, offset, out);
+    case ComponentType::u32: return read_as<std::uint32_t>(*bytes, offset, out);
+    case ComponentType::f32: return read_as<float>(*bytes, offset, out);
+  }
+}
+
+template <class T>
+void Accessor::read_as(const ByteView& bytes, std::size_t offset, double* out) const {
+  const ByteView element(bytes.part(offset, element_bytes_));
   const int rows = components_ / columns_;
   const std::size_t column_bytes = element_bytes_ / static_cast<std::size_t>(columns_);
-  for (int c = 0; c < components_; ++c) {
-    const std::size_t at = offset + static_cast<std::size_t>(c / rows) * column_bytes + static_cast<std::size_t>(c % rows) * component_bytes(type_);
-    out[c] = component(*bytes, type_, at);
+  for (int column = 0; column < columns_; ++column) {
+    for (int row = 0; row < rows; ++row) {
+      *out++ = static_cast<double>(element.load<T>(static_cast<std::size_t>(column) * column_bytes + static_cast<std::size_t>(row) * sizeof(T)));
+    }
   }
   if (!normalized_) return;
   // Section 3.11 of the specification: the same scale for both signs, -128 and -127 alike -1.
-  const double scale = type_ == ComponentType::i8 ? 127 : type_ == ComponentType::u8 ? 255 : type_ == ComponentType::i16 ? 32767 : 65535;
-  for (int c = 0; c < components_; ++c) out[c] = std::max(out[c] / scale, -1.0);
+  constexpr auto kScale = static_cast<double>(std::numeric_limits<T>::max());
+  for (int i = 1; i <= components_; ++i) out[-i] = std::max(out[-i] / kScale, -1.0);
 }
 
 void Accessor::check_sparse_order() const {

@@ -31,15 +31,21 @@ class Accessor {
   bool has_data() const { return dense_.size() > 0 || sparse_count_ > 0; }
   const Json& json() const { return json_; }
 
-  /// Element `i` as numbers, normalised integers as fractions; what is beyond the components stays as it is in `out`.
+  /// Element `i` as numbers, column by column; normalised integers become fractions.
   void read(std::size_t i, double* out) const;
 
+  /// The first N of them; 0 where the element has fewer.
   template <int N>
   std::array<double, N> get(std::size_t i) const {
+    if (components_ == N) {
+      std::array<double, N> values;
+      read(i, values.data());
+      return values;
+    }
     std::array<double, 16> all{};
     read(i, all.data());
-    std::array<double, N> some;
-    std::copy_n(all.begin(), N, some.begin());
+    std::array<double, N> some{};
+    std::copy_n(all.begin(), std::min(N, 16), some.begin());
     return some;
   }
   DVec3 vec3(std::size_t i) const {
@@ -55,7 +61,8 @@ class Accessor {
  private:
   void place_dense(const Model& model);
   void place_sparse(const Model& model);
-  double component(const ByteView& bytes, ComponentType type, std::size_t offset) const;
+  template <class T>
+  void read_as(const ByteView& bytes, std::size_t offset, double* out) const;
   std::uint64_t sparse_index(std::size_t i) const;
 
   Json json_;

@@ -41,6 +41,7 @@ class Json {
   // The value as a C++ type; `fallback` where it is absent. Kinds and ranges are checked beforehand (gltf_schema.hpp).
   double number(double fallback) const;
   std::int64_t integer(std::int64_t fallback) const { return static_cast<std::int64_t>(number(static_cast<double>(fallback))); }
+  std::size_t index() const { return static_cast<std::size_t>(number(0)); }
   bool boolean(bool fallback) const;
   std::string_view text(std::string_view fallback = {}) const;
 

@@ -167,7 +167,7 @@ void MaterialReader::read_specular_glossiness(Json json, Material& m, UvSets& se
 TextureRef MaterialReader::texture(Json info, bool srgb, UvSets& sets) {
   TextureRef result;
   if (!info) return result;
-  const Json json = model_.textures[static_cast<std::size_t>(info["index"].integer(0))];
+  const Json json = model_.textures[info["index"].index()];
   if (!json["source"]) {
     model_.notes.count("texture has no PNG or JPEG image and is ignored", "textures have no PNG or JPEG image and are ignored", 1);
     return result;
@@ -175,7 +175,7 @@ TextureRef MaterialReader::texture(Json info, bool srgb, UvSets& sets) {
   const Json transform = info["extensions"]["KHR_texture_transform"];
   set_transform(transform, result);
   if (const Json index = json["sampler"]) {
-    const Json sampler = model_.samplers[static_cast<std::size_t>(index.integer(0))];
+    const Json sampler = model_.samplers[index.index()];
     result.wrap_s = wrap(sampler["wrapS"]);
     result.wrap_t = wrap(sampler["wrapT"]);
     result.nearest = sampler["magFilter"].integer(9729) == 9728;
@@ -183,7 +183,7 @@ TextureRef MaterialReader::texture(Json info, bool srgb, UvSets& sets) {
 
   const Json overriding = transform["texCoord"];
   result.uv_set = uv_set(overriding ? overriding : info["texCoord"], info, sets);
-  result.image = image(static_cast<std::size_t>(json["source"].integer(0)), srgb);
+  result.image = image(json["source"].index(), srgb);
   return result;
 }
 
@@ -206,7 +206,7 @@ Image MaterialReader::read_image(std::size_t index, bool srgb) {
       held = is_named ? model_.folder.read_uri(uri.text(), model_.memory) : decode_data_uri(uri.text(), model_.memory);
       bytes = held.span();
     } else {
-      const ByteView data = model_.view(static_cast<std::size_t>(view.integer(0)));
+      const ByteView data = model_.view(view.index());
       bytes = data.part(0, data.size());
     }
     return decode_image(bytes, srgb, [&](double size) { model_.memory.claim(size, "the decoded image"); });

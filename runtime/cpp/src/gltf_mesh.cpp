@@ -80,7 +80,7 @@ MeshSize MeshWriter::measure(Json mesh) const {
   for (const Json primitive : mesh["primitives"]) {
     const Json position = primitive["attributes"]["POSITION"], indices = primitive["indices"];
     if (!position) continue;
-    const auto count_of = [&](Json accessor) { return static_cast<std::size_t>(model_.accessors[static_cast<std::size_t>(accessor.integer(0))]["count"].integer(0)); };
+    const auto count_of = [&](Json accessor) { return static_cast<std::size_t>(model_.accessors[accessor.index()]["count"].integer(0)); };
     const std::size_t vertices = count_of(position), corners = indices ? count_of(indices) : vertices;
     const auto triangles = static_cast<double>(triangle_count(primitive["mode"].integer(kTriangles), corners));
     const auto used = triangles == 0 ? 0.0 : static_cast<double>(std::min(vertices, corners));
@@ -101,10 +101,19 @@ void MeshWriter::add(const Placement& placement) {
   for (const Json primitive : placement.mesh["primitives"]) add_primitive(primitive, placement);
 }
 
+void MeshWriter::check(Json mesh) {
+  for (const Json primitive : mesh["primitives"]) {
+    const Json position = primitive["attributes"]["POSITION"];
+    if (!position || primitive["mode"].integer(kTriangles) < kTriangles) continue;
+    read_corners(primitive, static_cast<std::size_t>(model_.accessors[position.index()]["count"].integer(0)));
+    read_attributes(primitive, {mesh, mesh, {}, nullptr}, UvSets{});
+  }
+}
+
 Accessor MeshWriter::attribute(Json attributes, std::string_view name, std::string_view types, unsigned formats, unsigned quantized_formats) {
   const Json reference = attributes[name];
   if (!reference) return {};
-  Accessor accessor(model_, static_cast<std::size_t>(reference.integer(0)));
+  Accessor accessor(model_, reference.index());
   const unsigned format = format_bit(accessor.component_type(), accessor.normalized());
   const bool known = types.find(accessor.type()) != std::string_view::npos && (format & (formats | quantized_formats)) != 0;
   if (!known) reference.fail(format_text(accessor) + " is not a format for this");
@@ -112,14 +121,21 @@ Accessor MeshWriter::attribute(Json attributes, std::string_view name, std::stri
   return accessor;
 }
 
-MeshWriter::Attributes MeshWriter::read_attributes(Json primitive, const Placement& placement, std::uint32_t material) {
+/// All attributes of a primitive and its targets have as many elements as POSITION, also those that are not read.
+void MeshWriter::require_count(Json attributes, std::size_t wanted) const {
+  for (const Json member : attributes) {
+    const auto count = static_cast<std::size_t>(model_.accessors[member.index()]["count"].integer(0));
+    if (count != wanted) member.fail("has " + std::to_string(count) + " elements, POSITION has " + std::to_string(wanted));
+  }
+}
+
+MeshWriter::Attributes MeshWriter::read_attributes(Json primitive, const Placement& placement, const UvSets& sets) {
   const Json json = primitive["attributes"];
   Attributes a;
   a.position = attribute(json, "POSITION", "VEC3", kF32, kAnySmall);
   a.normal = attribute(json, "NORMAL", "VEC3", kF32, kI8N | kI16N);
   a.tangent = attribute(json, "TANGENT", "VEC4", kF32, kI8N | kI16N);
   a.color = attribute(json, "COLOR_0", "VEC3 VEC4", kF32 | kU8N | kU16N, 0);
-  const UvSets& sets = materials_.uv_sets(material);
   for (const std::size_t set : {0, 1}) {
     a.uv[set] = attribute(json, "TEXCOORD_" + std::to_string(sets.texcoord[set]), "VEC2", kF32 | kU8N | kU16N, kAnySmall);
     if (!a.uv[set] && sets.used[set]) model_.notes.count("textured mesh has no texture coordinates", "textured meshes have no texture coordinates", 1);
@@ -143,17 +159,11 @@ MeshWriter::Attributes MeshWriter::read_attributes(Json primitive, const Placeme
   for (const Json target : primitive["targets"]) {
     const double weight = i < weight_of.size() ? weight_of[i] : 0;
     ++i;
-    for (const Json member : target) {
-      const std::size_t count = static_cast<std::size_t>(model_.accessors[static_cast<std::size_t>(member.integer(0))]["count"].integer(0));
-      if (count != a.position.count()) member.fail("has " + std::to_string(count) + " elements, POSITION has " + std::to_string(a.position.count()));
-    }
+    require_count(target, a.position.count());
     if (weight == 0) continue;
     a.targets.push_back({weight, attribute(target, "POSITION", "VEC3", kF32, kAnySmall), attribute(target, "NORMAL", "VEC3", kF32, kI8N | kI16N), attribute(target, "TANGENT", "VEC3", kF32, kI8N | kI16N)});
   }
-  for (const Json member : json) {
-    const auto count = static_cast<std::size_t>(model_.accessors[static_cast<std::size_t>(member.integer(0))]["count"].integer(0));
-    if (count != a.position.count()) member.fail("has " + std::to_string(count) + " elements, POSITION has " + std::to_string(a.position.count()));
-  }
+  require_count(json, a.position.count());
   return a;
 }
 
@@ -223,12 +233,12 @@ void MeshWriter::number_vertices(std::size_t vertex_count) {
 void MeshWriter::add_primitive(Json primitive, const Placement& placement) {
   const Json position = primitive["attributes"]["POSITION"];
   if (!position) return model_.notes.count("primitive without positions is ignored", "primitives without positions are ignored", 1);
-  const Json count = model_.accessors[static_cast<std::size_t>(position.integer(0))]["count"];
-  if (!read_corners(primitive, static_cast<std::size_t>(count.integer(0)))) return;
+  const Json count = model_.accessors[position.index()]["count"];
+  if (!read_corners(primitive, count.index())) return;
 
   Part part;
   part.material = materials_.use(primitive["material"]);
-  const Attributes attributes = read_attributes(primitive, placement, part.material);
+  const Attributes attributes = read_attributes(primitive, placement, materials_.uv_sets(part.material));
   if (!attributes.position.has_data() && primitive["extensions"]["KHR_draco_mesh_compression"]) primitive.fail("the extension KHR_draco_mesh_compression is not supported, and there is no uncompressed data beside it");
   number_vertices(attributes.position.count());
 
@@ -315,15 +325,10 @@ void MeshWriter::append_vertex(const Attributes& attributes, const Part& part, c
 }
 
 void MeshWriter::append_triangles(const std::vector<bool>& mirrored, std::uint32_t first_vertex, bool is_strip) {
-  double broken = 0, degenerate = 0;
+  double broken = 0, degenerate = 0;  // strips are sewn together with triangles without area: those need no note
   for (std::size_t i = 0; i < corners_.size(); i += 3) {
     UVec3 triangle(corners_[i], corners_[i + 1], corners_[i + 2]);
     const bool flip = mirrored[triangle.x];
-    if (triangle.x == triangle.y || triangle.y == triangle.z || triangle.z == triangle.x) {
-      // Strips are sewn together with such triangles.
-      if (!is_strip) ++degenerate;
-      continue;
-    }
     triangle += first_vertex;
     const DVec3 &a = world_[triangle.x], &b = world_[triangle.y], &c = world_[triangle.z];
     if (!is_usable(a) || !is_usable(b) || !is_usable(c)) {
@@ -333,7 +338,7 @@ void MeshWriter::append_triangles(const std::vector<bool>& mirrored, std::uint32
     const DVec3 u = b - a, v = c - a, n = glm::cross(u, v);
     constexpr double kLeastSine = 1e-14;
     if (!(glm::dot(n, n) > kLeastSine * kLeastSine * glm::dot(u, u) * glm::dot(v, v))) {
-      ++degenerate;
+      degenerate += is_strip ? 0 : 1;
       continue;
     }
     if (flip) std::swap(triangle.y, triangle.z);

@@ -29,6 +29,8 @@ class MeshWriter {
 
   MeshSize measure(Json mesh) const;
   void add(const Placement& placement);
+  /// Throws Error if a mesh that no node uses breaks the rules.
+  void check(Json mesh);
 
   MaterialReader& materials() { return materials_; }
   /// World position of each vertex.
@@ -47,7 +49,8 @@ class MeshWriter {
   };
 
   void add_primitive(Json primitive, const Placement& placement);
-  Attributes read_attributes(Json primitive, const Placement& placement, std::uint32_t material);
+  Attributes read_attributes(Json primitive, const Placement& placement, const UvSets& sets);
+  void require_count(Json attributes, std::size_t wanted) const;
   Accessor attribute(Json attributes, std::string_view name, std::string_view types, unsigned formats, unsigned quantized_formats);
   bool read_corners(Json primitive, std::size_t vertex_count);
   void number_vertices(std::size_t vertex_count);

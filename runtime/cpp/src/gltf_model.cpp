@@ -43,7 +43,6 @@ constexpr std::string_view kMeshopt = "EXT_meshopt_compression";
 
 bool is_read(std::string_view name) { return std::find(kRead.begin(), kRead.end(), name) != kRead.end(); }
 
-bool has_meshopt_fallback(Json buffer) { return static_cast<bool>(buffer["extensions"][kMeshopt]); }
 
 [[noreturn]] void refuse_extension(Json at, std::string_view name, std::string_view why) {
   at.fail("the extension " + printable(name, 80) + " " + std::string(why));
@@ -130,14 +129,19 @@ void Model::load_buffers(const Glb& glb) {
   for (const Json buffer : root()["buffers"]) buffers.push_back(load_buffer(buffer, index++, glb));
 }
 
+/// True if a buffer is there for what a decoder of EXT_meshopt_compression would write.
+bool Model::holds_meshopt_data(std::size_t buffer) const {
+  return std::any_of(buffer_views.begin(), buffer_views.end(), [&](Json view) { return view["buffer"].index() == buffer && view["extensions"][kMeshopt]; });
+}
+
 Bytes Model::load_buffer(Json buffer, std::size_t index, const Glb& glb) {
   const Json uri = buffer["uri"];
-  const auto wanted = static_cast<std::size_t>(buffer["byteLength"].integer(0));
+  const auto wanted = buffer["byteLength"].index();
   Bytes bytes;
   if (!uri) {
     if (index == 0 && glb.has_binary) {
       bytes = {std::shared_ptr<std::uint8_t[]>(file.data, file.data.get() + (glb.binary.data() - file.data.get())), glb.binary.size()};
-    } else if (has_meshopt_fallback(buffer)) {
+    } else if (holds_meshopt_data(index)) {
       refuse_extension(buffer, kMeshopt, "is not supported, and there is no uncompressed data beside it");
     } else {
       buffer.fail("uri", index == 0 ? "is missing, and the file has no binary GLB chunk" : "is missing");
@@ -156,7 +160,7 @@ Bytes Model::load_buffer(Json buffer, std::size_t index, const Glb& glb) {
 
 void Model::check_buffer_views() const {
   for (const Json json : buffer_views) {
-    const std::size_t buffer_size = buffers[static_cast<std::size_t>(json["buffer"].integer(0))].size;
+    const std::size_t buffer_size = buffers[json["buffer"].index()].size;
     const auto offset = static_cast<std::uint64_t>(json["byteOffset"].integer(0)), length = static_cast<std::uint64_t>(json["byteLength"].integer(0));
     if (offset > buffer_size || length > buffer_size - offset) {
       json.fail(std::to_string(length) + " bytes from byte " + std::to_string(offset) + " on do not fit the buffer with its " + std::to_string(buffer_size) + " bytes");
@@ -168,8 +172,8 @@ void Model::check_buffer_views() const {
 
 ByteView Model::view(std::size_t buffer_view) const {
   const Json json = buffer_views[buffer_view];
-  const ByteView buffer(buffers[static_cast<std::size_t>(json["buffer"].integer(0))].span());
-  return ByteView(buffer.part(static_cast<std::size_t>(json["byteOffset"].integer(0)), static_cast<std::size_t>(json["byteLength"].integer(0))));
+  const ByteView buffer(buffers[json["buffer"].index()].span());
+  return ByteView(buffer.part(json["byteOffset"].index(), json["byteLength"].index()));
 }
 
 }  // namespace ln::gltf

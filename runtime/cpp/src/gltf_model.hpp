@@ -76,6 +76,7 @@ struct Model {
   void check_extensions();
   void load_buffers(const Glb& glb);
   Bytes load_buffer(Json buffer, std::size_t index, const Glb& glb);
+  bool holds_meshopt_data(std::size_t buffer) const;
   void check_buffer_views() const;
 };
 

@@ -18,8 +18,6 @@ std::array<double, N> numbers(Json array, std::array<double, N> values) {
 
 DVec3 vec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
-std::uint32_t index_of(Json json) { return static_cast<std::uint32_t>(json.integer(0)); }
-
 }  // namespace
 
 Affine make_trs(const DVec3& translation, const std::array<double, 4>& rotation, const DVec3& scale) {
@@ -45,10 +43,11 @@ NodeForest::NodeForest(Model& model) : model_(model) {
   constexpr std::uint32_t kNone = UINT32_MAX;
   std::vector<std::uint32_t> parent(count, kNone);
   for (std::uint32_t i = 0; i < count; ++i) {
+    check_transform(model.nodes[i]);
     for (const Json child : model.nodes[i]["children"]) {
-      std::uint32_t& known = parent[index_of(child)];
+      std::uint32_t& known = parent[child.index()];
       if (known != kNone) {
-        child.fail("nodes[" + std::to_string(index_of(child)) + "] is a child of nodes[" + std::to_string(known) + "] already; nodes must form trees");
+        child.fail("nodes[" + std::to_string(child.index()) + "] is a child of nodes[" + std::to_string(known) + "] already; nodes must form trees");
       }
       known = i;
     }
@@ -64,7 +63,7 @@ NodeForest::NodeForest(Model& model) : model_(model) {
     const std::uint32_t node = open.back();
     open.pop_back();
     reached[node] = true;
-    for (const Json child : model.nodes[node]["children"]) open.push_back(index_of(child));
+    for (const Json child : model.nodes[node]["children"]) open.push_back(child.index());
   }
   for (std::uint32_t i = 0; i < count; ++i) {
     if (!reached[i]) model.nodes[i].fail("the node is its own descendant, or below one that is");
@@ -83,7 +82,7 @@ std::vector<std::uint32_t> NodeForest::scene_roots() const {
     return flags;
   }();
   for (const Json node : scene["nodes"]) {
-    const std::uint32_t index = index_of(node);
+    const std::uint32_t index = node.index();
     if (listed[index]) node.fail("nodes[" + std::to_string(index) + "] is listed twice");
     if (!is_root[index]) node.fail("nodes[" + std::to_string(index) + "] is the child of another node; a scene lists root nodes only");
     listed[index] = true;
@@ -92,21 +91,27 @@ std::vector<std::uint32_t> NodeForest::scene_roots() const {
   return roots;
 }
 
-Affine NodeForest::local(Json node) const {
-  const Json matrix = node["matrix"], translation = node["translation"], rotation = node["rotation"], scale = node["scale"];
+void NodeForest::check_transform(Json node) const {
+  const Json matrix = node["matrix"], rotation = node["rotation"];
   if (matrix) {
-    if (translation || rotation || scale) node.fail("has a matrix and also translation, rotation or scale");
     const auto m = numbers<16>(matrix, {});
     constexpr double kSlack = 1e-6;
     const bool affine = std::abs(m[3]) <= kSlack && std::abs(m[7]) <= kSlack && std::abs(m[11]) <= kSlack && std::abs(m[15] - 1) <= kSlack;
     if (!affine) matrix.fail("the last row is not 0 0 0 1");
-    return make_affine(m);
+    const bool has_more = node["translation"] || rotation || node["scale"];
+    if (has_more) model_.notes.count("node has a matrix and also translation, rotation or scale; the matrix is used", "nodes have a matrix and also translation, rotation or scale; the matrix is used", 1);
+    return;
   }
+  if (!rotation) return;
   const auto q = numbers<4>(rotation, {0, 0, 0, 1});
-  if (q == std::array<double, 4>{}) rotation.fail("the quaternion is zero");
   const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (norm == 0) rotation.fail("the quaternion is zero");
   if (std::abs(norm - 1) > 1e-2) model_.notes.count("rotation is not a unit quaternion and was normalised", "rotations are not unit quaternions and were normalised", 1);
-  return make_trs(vec3(numbers<3>(translation, {})), q, vec3(numbers<3>(scale, {1, 1, 1})));
+}
+
+Affine NodeForest::local(Json node) const {
+  if (const Json matrix = node["matrix"]) return make_affine(numbers<16>(matrix, {}));
+  return make_trs(vec3(numbers<3>(node["translation"], {})), numbers<4>(node["rotation"], {0, 0, 0, 1}), vec3(numbers<3>(node["scale"], {1, 1, 1})));
 }
 
 void NodeForest::walk(const std::vector<std::uint32_t>& roots, const std::function<void(std::uint32_t, const Affine&)>& visit) const {
@@ -127,7 +132,7 @@ void NodeForest::walk(const std::vector<std::uint32_t>& roots, const std::functi
     while (!levels.empty()) {
       Level& level = levels.back();
       if (level.next != level.end) {
-        const std::uint32_t child = index_of(*level.next);
+        const std::uint32_t child = (*level.next).index();
         ++level.next;
         const Affine parent = level.world;
         enter(child, parent);

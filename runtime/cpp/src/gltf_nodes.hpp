@@ -26,7 +26,7 @@ Affine make_affine(const std::array<double, 16>& matrix);
 /// The nodes of a file: trees, or it is refused.
 class NodeForest {
  public:
-  /// Throws Error if a node is listed as a child twice or the nodes form a cycle.
+  /// Throws Error if a node is listed as a child twice, the nodes form a cycle, or a transform makes no sense.
   explicit NodeForest(Model& model);
 
   /// The nodes without parent, in file order.
@@ -38,6 +38,7 @@ class NodeForest {
   void walk(const std::vector<std::uint32_t>& roots, const std::function<void(std::uint32_t, const Affine&)>& visit) const;
 
  private:
+  void check_transform(Json node) const;
   Affine local(Json node) const;
 
   Model& model_;

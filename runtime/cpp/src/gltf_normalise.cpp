@@ -43,51 +43,54 @@ std::uint64_t mix(std::uint64_t x) {
   return x ^ (x >> 33);
 }
 
-struct TriangleKey {
-  std::array<Corner, 3> corners;
-  std::uint32_t group;
-  bool operator==(const TriangleKey&) const = default;
-
-  std::uint64_t hash() const {
-    std::uint64_t h = group;
-    for (const Corner& corner : corners) {
-      for (const std::uint32_t bits : corner) h = mix(h + 0x9e3779b97f4a7c15ull + bits);
-    }
-    return h;
-  }
-};
-
+/// Finds triangles with the same corners through a hash table with open addressing; its entries hold half of the hash, so
+/// that triangles which differ are rarely looked at.
 class DuplicateFinder {
  public:
-  explicit DuplicateFinder(const SceneData& scene) : scene_(scene), slots_(std::bit_ceil(2 * scene.triangles.size() + 1), kFree) {}
+  explicit DuplicateFinder(const SceneData& scene) : scene_(scene), slots_(std::bit_ceil(scene.triangles.size() * 3 / 2 + 1), kFree) {
+    vertex_hashes_.reserve(scene.positions.size());
+    for (const Vec3& position : scene.positions) {
+      const Corner bits = corner_bits(position);
+      vertex_hashes_.push_back(mix(mix(bits[0] + (static_cast<std::uint64_t>(bits[1]) << 32)) + bits[2]));
+    }
+    for (const Material& material : scene.materials) {
+      groups_.push_back(material.alpha_mode == AlphaMode::opaque ? 0 : static_cast<std::uint32_t>(groups_.size()) + 1);
+    }
+  }
 
   /// True if a triangle with the same corners was seen before.
   bool seen_before(std::uint32_t triangle) {
-    const TriangleKey key = key_of(triangle);
+    const UVec3& t = scene_.triangles[triangle];
+    const std::uint64_t hash = mix(vertex_hashes_[t.x] + vertex_hashes_[t.y] + vertex_hashes_[t.z] + group(triangle));
+    const std::uint64_t entry = (hash & ~0xffffffffull) | triangle;
     const std::size_t mask = slots_.size() - 1;
-    for (std::size_t at = key.hash() & mask;; at = (at + 1) & mask) {
+    for (std::size_t at = hash & mask;; at = (at + 1) & mask) {
       if (slots_[at] == kFree) {
-        slots_[at] = triangle;
+        slots_[at] = entry;
         return false;
       }
-      if (key_of(slots_[at]) == key) return true;
+      if ((slots_[at] ^ entry) >> 32 == 0 && same_corners(static_cast<std::uint32_t>(slots_[at]), triangle)) return true;
     }
   }
 
  private:
-  static constexpr std::uint32_t kFree = UINT32_MAX;
+  static constexpr std::uint64_t kFree = ~0ull;
 
-  TriangleKey key_of(std::uint32_t triangle) const {
+  std::uint32_t group(std::uint32_t triangle) const { return groups_[scene_.parts[scene_.triangle_part[triangle]].material]; }
+
+  std::array<Corner, 3> corners(std::uint32_t triangle) const {
     const UVec3& t = scene_.triangles[triangle];
-    const std::uint32_t material = scene_.parts[scene_.triangle_part[triangle]].material;
-    const bool is_opaque = scene_.materials[material].alpha_mode == AlphaMode::opaque;
-    TriangleKey key{{corner_bits(scene_.positions[t.x]), corner_bits(scene_.positions[t.y]), corner_bits(scene_.positions[t.z])}, is_opaque ? 0 : material + 1};
-    std::sort(key.corners.begin(), key.corners.end());
-    return key;
+    std::array<Corner, 3> corners{corner_bits(scene_.positions[t.x]), corner_bits(scene_.positions[t.y]), corner_bits(scene_.positions[t.z])};
+    std::sort(corners.begin(), corners.end());
+    return corners;
   }
 
+  bool same_corners(std::uint32_t a, std::uint32_t b) const { return group(a) == group(b) && corners(a) == corners(b); }
+
   const SceneData& scene_;
-  std::vector<std::uint32_t> slots_;
+  std::vector<std::uint64_t> slots_;
+  std::vector<std::uint64_t> vertex_hashes_;
+  std::vector<std::uint32_t> groups_;  // by material: 0, or one's own
 };
 
 // ---------------------------------------------------------------- removing
@@ -160,11 +163,13 @@ std::vector<bool> find_doomed(const SceneData& scene, Notes& notes) {
   }
   DuplicateFinder finder(scene);
   for (const bool emitting : {true, false}) {
-    for (std::uint32_t i = 0; i < doomed.size(); ++i) {
-      const bool emits = scene.materials[scene.parts[scene.triangle_part[i]].material].emits();
-      if (doomed[i] || emits != emitting || !finder.seen_before(i)) continue;
-      doomed[i] = true;
-      ++duplicate;
+    for (const Part& part : scene.parts) {
+      if (scene.materials[part.material].emits() != emitting) continue;
+      for (std::uint32_t i = part.first_triangle; i < part.first_triangle + part.triangle_count; ++i) {
+        if (doomed[i] || !finder.seen_before(i)) continue;
+        doomed[i] = true;
+        ++duplicate;
+      }
     }
   }
   if (degenerate > 0) notes.count("triangle without area was dropped", "triangles without area were dropped", degenerate);

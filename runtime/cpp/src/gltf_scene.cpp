@@ -15,8 +15,6 @@
 namespace ln::gltf {
 namespace {
 
-std::size_t index_of(Json json) { return static_cast<std::size_t>(json.integer(0)); }
-
 /// An object at a node, kept until the box of the scene is known.
 struct Placed {
   std::uint32_t node;
@@ -46,6 +44,7 @@ class SceneReader {
   MeshWriter meshes_;
   std::map<std::uint32_t, Affine> joint_worlds_;  // of nodes that are joints of some skin
   std::map<std::size_t, std::vector<Affine>> joints_;  // by skin
+  std::vector<bool> used_meshes_;
   std::vector<Placed> cameras_, lights_;
   Normalisation normalised_;
 };
@@ -55,14 +54,16 @@ class SceneReader {
 /// Adds up what all meshes will need before the first one is read.
 void SceneReader::measure() {
   std::map<std::size_t, MeshSize> sizes;
+  used_meshes_.resize(model_.meshes.size(), false);
   MeshSize total;
   forest_.walk(roots_, [&](std::uint32_t index, const Affine&) {
     const Json node = model_.nodes[index], mesh = node["mesh"];
     if (!mesh) return;
-    const auto [size, is_new] = sizes.try_emplace(index_of(mesh));
-    if (is_new) size->second = meshes_.measure(model_.meshes[index_of(mesh)]);
+    used_meshes_[mesh.index()] = true;
+    const auto [size, is_new] = sizes.try_emplace(mesh.index());
+    if (is_new) size->second = meshes_.measure(model_.meshes[mesh.index()]);
     double copies = 1;
-    for (const Json attribute : node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]) copies = model_.accessors[index_of(attribute)]["count"].number(1);
+    for (const Json attribute : node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]) copies = model_.accessors[attribute.index()]["count"].number(1);
     total.triangles += copies * size->second.triangles;
     total.bytes += copies * size->second.bytes;
   });
@@ -76,7 +77,7 @@ void SceneReader::read_joints() {
   if (model_.skins.size() == 0) return;
   std::vector<bool> is_joint(model_.nodes.size(), false);
   for (const Json skin : model_.skins) {
-    for (const Json joint : skin["joints"]) is_joint[index_of(joint)] = true;
+    for (const Json joint : skin["joints"]) is_joint[joint.index()] = true;
   }
   forest_.walk(forest_.roots(), [&](std::uint32_t index, const Affine& world) {
     if (is_joint[index]) joint_worlds_[index] = world;
@@ -85,13 +86,13 @@ void SceneReader::read_joints() {
     const Json skin = model_.skins[s], inverse = skin["inverseBindMatrices"];
     Accessor matrices;
     if (inverse) {
-      matrices = Accessor(model_, index_of(inverse));
+      matrices = Accessor(model_, inverse.index());
       if (matrices.type() != "MAT4" || matrices.component_type() != ComponentType::f32) inverse.fail("must be an accessor of MAT4 of FLOAT");
       if (matrices.count() < skin["joints"].size()) inverse.fail("has " + std::to_string(matrices.count()) + " matrices for " + std::to_string(skin["joints"].size()) + " joints");
     }
     std::size_t i = 0;
     for (const Json joint : skin["joints"]) {
-      const Affine& world = joint_worlds_[static_cast<std::uint32_t>(index_of(joint))];
+      const Affine& world = joint_worlds_[static_cast<std::uint32_t>(joint.index())];
       joints_[s].push_back(inverse ? world * make_affine(matrices.get<16>(i)) : world);
       ++i;
     }
@@ -104,14 +105,14 @@ std::vector<Affine> SceneReader::instances(Json node) const {
   const auto read = [&](std::string_view name, std::string_view type) {
     const Json reference = attributes[name];
     if (!reference) return Accessor();
-    Accessor accessor(model_, index_of(reference));
+    Accessor accessor(model_, reference.index());
     if (accessor.type() != type) reference.fail("is an accessor of " + std::string(accessor.type()) + " where " + std::string(type) + " is wanted");
     return accessor;
   };
   const Accessor translation = read("TRANSLATION", "VEC3"), rotation = read("ROTATION", "VEC4"), scale = read("SCALE", "VEC3");
   std::size_t count = 0;
   for (const Json reference : attributes) {
-    const std::size_t n = Accessor(model_, index_of(reference)).count();
+    const std::size_t n = Accessor(model_, reference.index()).count();
     if (count != 0 && n != count) reference.fail("has " + std::to_string(n) + " elements, another attribute has " + std::to_string(count));
     count = n;
   }
@@ -127,8 +128,8 @@ std::vector<Affine> SceneReader::instances(Json node) const {
 
 void SceneReader::add_mesh(Json node, const Affine& world) {
   const Json skin = node["skin"];
-  const std::vector<Affine>* joints = skin ? &joints_.at(index_of(skin)) : nullptr;
-  for (const Affine& instance : instances(node)) meshes_.add({node, model_.meshes[index_of(node["mesh"])], world * instance, joints});
+  const std::vector<Affine>* joints = skin ? &joints_.at(skin.index()) : nullptr;
+  for (const Affine& instance : instances(node)) meshes_.add({node, model_.meshes[node["mesh"].index()], world * instance, joints});
 }
 
 void SceneReader::visit(std::uint32_t index, const Affine& world) {
@@ -151,7 +152,7 @@ DVec3 direction(const DVec3& v) {
 bool is_finite_position(const Vec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
 void SceneReader::add_camera(const Placed& placed) {
-  const Json node = model_.nodes[placed.node], json = model_.cameras[index_of(node["camera"])];
+  const Json node = model_.nodes[placed.node], json = model_.cameras[node["camera"].index()];
   Camera camera;
   camera.name = json["name"].text();
   camera.node = node["name"].text();
@@ -193,7 +194,7 @@ Vec3 SceneReader::scaled_intensity(Json light, double factor) const {
 
 void SceneReader::add_light(const Placed& placed) {
   constexpr double kQuarterPi = 0.78539816339744830962;
-  const Json node = model_.nodes[placed.node], json = model_.lights[index_of(node["extensions"]["KHR_lights_punctual"]["light"])];
+  const Json node = model_.nodes[placed.node], json = model_.lights[node["extensions"]["KHR_lights_punctual"]["light"].index()];
   const std::string_view type = json["type"].text();
   PunctualLight light;
   light.kind = type == "point" ? PunctualKind::point : type == "spot" ? PunctualKind::spot : PunctualKind::directional;
@@ -228,6 +229,9 @@ SceneData SceneReader::read() {
   read_joints();
   forest_.walk(roots_, [&](std::uint32_t index, const Affine& world) { visit(index, world); });
   normalised_ = normalise_geometry(scene_, std::move(meshes_.world()), model_.notes);
+  for (std::size_t i = 0; i < used_meshes_.size(); ++i) {
+    if (!used_meshes_[i]) meshes_.check(model_.meshes[i]);
+  }
   if (scene_.materials.empty()) meshes_.materials().use({});
   for (Material& material : scene_.materials) {
     const double distance = static_cast<double>(material.attenuation_distance) / scene_.unit;

@@ -16,6 +16,7 @@
 #include "gltf_files.hpp"
 #include "image_plugin.hpp"
 #include "ln/text.hpp"
+#include "ln/texture.hpp"
 
 extern "C" {
 extern const unsigned char ln_image_plugin_begin[];
@@ -111,8 +112,7 @@ void make_linear(Image& image) {
   const int colors = image.channels < 3 ? 1 : 3;
   for (std::size_t i = 0; i < image.floats.size(); ++i) {
     if (static_cast<int>(i % static_cast<std::size_t>(image.channels)) >= colors) continue;
-    float& x = image.floats[i];
-    x = x <= 0.04045f ? x / 12.92f : std::pow((x + 0.055f) / 1.055f, 2.4f);
+    image.floats[i] = srgb_to_linear(image.floats[i]);
   }
 }
 

@@ -99,14 +99,14 @@ def reflectors_figure3() -> GltfWriter:
     """Three white bulbs in the foci of red, green and blue parabolic mirrors."""
     scene = GltfWriter("Three spotlights in coloured parabolic reflectors")
     white = scene.add_lambert("White", WHITE)
-    add_room(scene, (-4.0, 0.0, -5.0), (4.0, 4.5, 1.0), dict.fromkeys(("floor", "back", "left", "right"), white))
+    add_room(scene, (-2.8, 0.0, -4.0), (2.8, 3.6, 1.5), dict.fromkeys(("floor", "back", "left", "right"), white))
     focal_length = 0.2
-    dish = paraboloid(focal_length, 0.5, rings=16, segments=64)
+    dish = paraboloid(focal_length, 0.55, rings=16, segments=64)
     bulb = faceted(icosphere(0.06, 1))
-    bulb_light = scene.add_emitter("Bulb", (120.0, 120.0, 120.0))
+    bulb_light = scene.add_emitter("Bulb", (220.0, 220.0, 220.0))
     colors: dict[str, Vector] = {"red": (0.95, 0.08, 0.06), "green": (0.08, 0.9, 0.1), "blue": (0.08, 0.15, 0.95)}
-    for (name, color), x in zip(colors.items(), (-1.7, 0.0, 1.7), strict=True):
-        position, target = (x, 2.6, -3.0), (0.75 * x, 0.0, -1.7)
+    for (name, color), x in zip(colors.items(), (-1.5, 0.0, 1.5), strict=True):
+        position, target = (x, 2.2, -2.6), (0.75 * x, 0.0, -1.1)
         direction = normalized(sub(target, position))
         scene.add_object(
             f"Reflector {name}",
@@ -116,28 +116,28 @@ def reflectors_figure3() -> GltfWriter:
             rotation=look_rotation(normalized(cross(direction, (1.0, 0.0, 0.0))), direction),
         )
         scene.add_object(f"Bulb {name}", bulb, bulb_light, translation=add(position, scaled(direction, focal_length)))
-    scene.add_camera("Camera", (0.0, 3.2, 6.0), (0.0, 1.35, -2.2), 38.0)
+    scene.add_camera("Camera", (0.0, 2.0, 5.0), (0.0, 1.15, -2.0), 32.0)
     return scene
 
 
 def cylinder_figure4() -> GltfWriter:
     """A tube between the focus and the axis of half a cylinder, which focuses its light onto the floor."""
     scene = GltfWriter("A light in a semi-cylindrical reflector")
-    white = scene.add_lambert("White", WHITE)
-    walls = {"floor": white, "ceiling": white, "back": white}
+    walls = dict.fromkeys(WALL_NAMES, scene.add_lambert("White", WHITE))
     walls["left"] = scene.add_lambert("Wall left", (0.6, 0.45, 0.15))
     walls["right"] = scene.add_lambert("Wall right", (0.2, 0.4, 0.55))
-    add_room(scene, (-2.5, 0.0, -4.0), (2.5, 3.5, 0.0), walls)
-    scene.add_object(
-        "Table", box((1.0, 0.7, 0.8)), white, translation=(-1.55, 0.0, -3.2), rotation=axis_rotation(UP, 25)
-    )
-    radius, height = 0.45, 2.3
+    add_room(scene, (-2.5, 0.0, -5.0), (2.5, 3.2, 0.0), walls)
+    block = box((0.9, 0.8, 0.8))
+    scene.add_object("Table", block, walls["back"], translation=(-1.6, 0.0, -4.0), rotation=axis_rotation(UP, 25))
     # Mirror equation: 1/0.26 + 1/distance = 2/0.45 puts the image about 1.7 m below the vertex.
+    radius, height, turn = 0.45, 1.9, axis_rotation(UP, 35)
     mirror = scene.add_mirror("Mirror", (1.0, 1.0, 1.0))
-    scene.add_object("Reflector", trough(radius, 1.8, 96), mirror, translation=(0.2, height - radius, -1.9))
-    tube = scene.add_emitter("Tube", (60.0, 54.0, 45.0))
-    scene.add_object("Tube", rod(0.03, 1.6, 12), tube, translation=(0.2, height - 0.26, -1.9))
-    scene.add_camera("Camera", (0.0, 1.75, 4.6), (0.0, 1.6, 0.0), 41.0)
+    scene.add_object(
+        "Reflector", trough(radius, 1.6, 96), mirror, translation=(0.1, height - radius, -3.1), rotation=turn
+    )
+    tube = scene.add_emitter("Tube", (40.0, 36.0, 30.0))
+    scene.add_object("Tube", rod(0.03, 1.4, 12), tube, translation=(0.1, height - 0.26, -3.1), rotation=turn)
+    scene.add_camera("Camera", (0.0, 1.05, -0.1), (0.0, 1.0, -3.0), 58.0)
     return scene
 
 
@@ -151,7 +151,7 @@ def furnace(albedo: float = 0.5, emission: float = 1.0) -> GltfWriter:
 
 
 def closed_box() -> GltfWriter:
-    """A closed room, 4 x 3 x 5 m, nothing in it but a light; the camera sees five of its corners."""
+    """A closed room, 4 x 3 x 5 m, nothing in it but a light; the camera sees its four far corners."""
     scene = GltfWriter("Closed diffuse box")
     white = scene.add_lambert("White", (0.7, 0.7, 0.7))
     walls = dict.fromkeys(WALL_NAMES, white)
@@ -213,7 +213,7 @@ def glossy_tags() -> GltfWriter:
     white = scene.add_lambert("White", WHITE)
     walls = {"floor": scene.add_lambert("Floor", (0.5, 0.47, 0.42)), "back": white}
     walls["left"] = scene.add_lambert("Wall left", (0.55, 0.15, 0.12))
-    add_room(scene, (-3.0, 0.0, -4.0), (3.0, 3.5, 1.0), walls)
+    add_room(scene, (-3.0, 0.0, -4.0), (6.0, 5.0, 1.0), walls)
     sphere, small_sphere = icosphere(0.7, 4), icosphere(0.4, 4)
     gold = scene.add_material("Gold", (1.0, 0.78, 0.34), metallic=1.0, roughness=0.3)
     scene.add_object("Gold ball", sphere, gold, translation=(-1.1, 0.7, -2.4), tags=["small", "glossy"])
@@ -231,13 +231,13 @@ def glossy_tags() -> GltfWriter:
         tags=["small"],
     )
     mirror = scene.add_mirror("Mirror", (1.0, 1.0, 1.0))
-    panel = quad((0.0, 0.0, 0.0), (0.9, 0.0, 0.9), (0.0, 1.8, 0.0))
-    scene.add_object("Mirror panel", panel, mirror, translation=(1.75, 0.15, -3.5), rotation=axis_rotation(UP, 100))
+    panel = quad((-0.7, 0.0, 0.0), (1.4, 0.0, 0.0), (0.0, 1.9, 0.0))
+    scene.add_object("Mirror panel", panel, mirror, translation=(2.05, 0.05, -3.1), rotation=axis_rotation(UP, -32))
     light = scene.add_emitter("Light", (14.0, 13.0, 12.0))
     scene.add_object("Light", ceiling_light((-0.3, 3.3, -1.8), 1.2, 0.9), light)
     scene.add_light("Lamp", "point", 6.0, color=(1.0, 0.6, 0.3), position=(-2.3, 1.9, -2.9))
     scene.add_light("Sun", "directional", 1.2, color=(0.8, 0.9, 1.0), direction=(-0.6, -1.0, -0.45))
-    scene.add_camera("Camera", (0.4, 2.0, 4.6), (0.0, 1.15, -1.6), 38.0)
+    scene.add_camera("Camera", (0.4, 2.0, 4.6), (0.15, 1.1, -1.6), 36.0)
     return scene
 
 
@@ -263,7 +263,7 @@ def many_lights(triangles: int = 300_000, lights: int = 1000) -> GltfWriter:
             scale=(scale,) * 3,
         )
     bulb = faceted(octahedron(0.03))
-    power = 400_000.0 / lights
+    power = 20_000.0 / lights
     meshes = []
     for i in range(16):
         color = [pick.uniform(0.3, 1.0) for _ in range(3)]

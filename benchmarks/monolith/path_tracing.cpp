@@ -58,8 +58,8 @@ class PathTracing final : public NetworkRun {
         const float weight = pdf_w > 0 ? mis_weight(pdf_w, emitters.pdf_w(from, from_side, hit, ray.direction)) : 1;
         result += beta * light * weight;
       }
-      const Interaction at = scene.interaction(ray, hit);
-      if (!any(at.bsdf.events())) return result;
+      const Interaction at(scene, ray, hit);
+      if (!any(at.bsdf().events())) return result;
       beta *= at.transmittance;
 
       // Russian roulette.
@@ -71,15 +71,15 @@ class PathTracing final : public NetworkRun {
 
       const std::uint32_t base = (depth + 1) * kPerVertex;
       from = at.at;
-      from_side = at.bsdf.transmits_smoothly() ? Vec3(0) : at.front ? at.at.ng : -at.at.ng;
+      from_side = at.bsdf().transmits_smoothly() ? Vec3(0) : at.front ? at.at.ng : -at.at.ng;
 
       // Light from an emitter.
-      if (any(at.bsdf.events() & Events::DG)) {
+      if (any(at.bsdf().events() & Events::DG)) {
         const LightSample s = emitters.sample(from, from_side, random.get1(base + kPick), random.get2(base + kPosition));
         if (s.pdf_w > 0 && !is_black(s.radiance)) {
           const Vec3 local = at.frame.to_local(s.wi);
           if (at.side_agrees(s.wi, local.z)) {
-            const BsdfValue bsdf = at.bsdf.evaluate(at.wo_local, local);
+            const BsdfValue bsdf = at.bsdf().evaluate(at.wo_local, local);
             if (!is_black(bsdf.f_cos)) {
               const Ray shadow = std::isfinite(s.distance) ? spawn_ray_to(from, s.position) : spawn_ray(from, s.wi);
               if (!tracer.occluded(shadow, random.bits(base + kCoverage), kDirect)) {
@@ -93,7 +93,7 @@ class PathTracing final : public NetworkRun {
 
       // The next direction.
       BsdfSample s;
-      if (!at.bsdf.sample(at.wo_local, random.get1(base + kBsdfLobe), random.get2(base + kBsdfDirection), Events::all, Carried::radiance, s))
+      if (!at.bsdf().sample(at.wo_local, random.get1(base + kBsdfLobe), random.get2(base + kBsdfDirection), Events::all, Carried::radiance, s))
         return result;
       const Vec3 wi = at.frame.to_world(s.wi);
       if (!at.side_agrees(wi, s.wi.z)) return result;

@@ -22,7 +22,7 @@ struct NNDensity {
   Color answer(Request& request, const PhotonMap& map) const {
     if constexpr (!any(Request::receives & Events::D)) return Color(0);
     const Interaction& at = request.at();
-    if (map.empty() || !any(at.bsdf.events() & Events::D) || !reaches(request, to)) return Color(0);
+    if (map.empty() || !any(at.bsdf().events() & Events::D) || !reaches(request, to)) return Color(0);
     const Neighbourhood around{at.at.p, at.front ? at.at.ng : -at.at.ng, at.front};
     return request.scatter_irradiance(density_.irradiance(around));
   }

@@ -19,9 +19,9 @@ struct PathTracer {
     if (!ray || !ray->hit.found()) return Color(0);
 
     const Scene& scene = request.tracer().scene();
-    const Interaction at = scene.interaction(ray->ray, ray->hit);
+    const Interaction at(scene, ray->ray, ray->hit);
     if (from != kAnyTag && !(scene.part_tags(at.part) & from)) return Color(0);
-    if (!any(at.bsdf.events() & kVia)) return Color(0);
+    if (!any(at.bsdf().events() & kVia)) return Color(0);
 
     Color weight = ray->weight * at.transmittance;
     const float survival = survival_probability(request.beta() * weight, request.depth());

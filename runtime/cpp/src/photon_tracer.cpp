@@ -82,14 +82,14 @@ class ParticleChunk {
         ledger_.escaped += DVec3(flux);
         break;
       }
-      const Interaction at = scene_.interaction(ray, hit);
+      const Interaction at(scene_, ray, hit);
       if (at.transmittance != Color(1)) {
         const Color arriving = flux * at.transmittance;
         ledger_.absorbed += DVec3(flux) - DVec3(arriving);
         flux = arriving;
       }
       const float incoming = shading_correction(at);
-      if (via_.accepting[state] && any(at.bsdf.events() & Events::DG)) store(at, flux * incoming);
+      if (via_.accepting[state] && any(at.bsdf().events() & Events::DG)) store(at, flux * incoming);
 
       // Choose an event that leads on.
       BsdfSample sample;
@@ -159,7 +159,7 @@ class ParticleChunk {
     EventGroup groups[kEventCount];
     int group_count = 0;
     for (int e = 0; e < kEventCount; ++e) {
-      if (!any(at.bsdf.events() & kLetters[e])) continue;
+      if (!any(at.bsdf().events() & kLetters[e])) continue;
       const int next = via_.after(state, e, tag_bits);
       if (next < 0 || !live_[next]) continue;
       int g = 0;
@@ -174,7 +174,7 @@ class ParticleChunk {
     float probability = 1;
     if (group_count > 1) {
       float albedo[kEventCount], sum = 0;
-      for (int g = 0; g < group_count; ++g) sum += albedo[g] = max_component(at.bsdf.albedo(at.wo_local, groups[g].events));
+      for (int g = 0; g < group_count; ++g) sum += albedo[g] = max_component(at.bsdf().albedo(at.wo_local, groups[g].events));
       if (!(sum > 0)) return -1;
       float rest = u * sum;
       while (chosen + 1 < group_count && rest >= albedo[chosen]) rest -= albedo[chosen++];
@@ -182,7 +182,7 @@ class ParticleChunk {
       probability = albedo[chosen] / sum;
       u = std::min(rest / albedo[chosen], kOneMinusEpsilon);
     }
-    if (!at.bsdf.sample(at.wo_local, u, random.get2(dimension + kBsdfDirection), groups[chosen].events, Carried::flux, sample)) return -1;
+    if (!at.bsdf().sample(at.wo_local, u, random.get2(dimension + kBsdfDirection), groups[chosen].events, Carried::flux, sample)) return -1;
     sample.weight /= probability;
     return groups[chosen].state;
   }

@@ -47,6 +47,19 @@ void sort_by_coverage(SceneData& data) {
   data.parts = std::move(parts);
 }
 
+/// Are the part's vertex normals those of its triangles, so that nothing is to be interpolated?
+bool is_flat(const SceneData& data, const Part& part) {
+  constexpr float kTolerance = 1e-5f;
+  for (std::uint32_t t = part.first_triangle; t < part.first_triangle + part.triangle_count; ++t) {
+    const UVec3 i = data.triangles[t];
+    const Vec3 a = data.positions[i.x];
+    const Vec3 ng = glm::normalize(glm::cross(data.positions[i.y] - a, data.positions[i.z] - a));
+    for (int k = 0; k < 3; ++k)
+      if (!(glm::distance(data.normals[i[k]], ng) < kTolerance)) return false;
+  }
+  return true;
+}
+
 bool matches(const char* glob, const std::string& name) { return fnmatch(glob, name.c_str(), 0) == 0; }
 
 bool matches_any(const char* glob, const std::vector<std::string>& names) {
@@ -110,6 +123,8 @@ Scene::Scene(SceneData data, std::span<const TagRule> tags, int threads, const I
     if (m.transmission > 0 && m.solid && m.ior > 0 && rough && !m.unlit)
       dielectrics_[i] = std::make_unique<DielectricTable>(m.ior);
   }
+  for (Part& part : data_.parts)
+    if (part.has_normals && !data_.materials[part.material].normal_texture && is_flat(data_, part)) part.has_normals = false;
   baked_.resize(data_.parts.size());
   part_tags_.reserve(data_.parts.size());
   for (std::size_t i = 0; i < data_.parts.size(); ++i) {
@@ -118,8 +133,9 @@ Scene::Scene(SceneData data, std::span<const TagRule> tags, int threads, const I
     events_ = events_ | possible_events(m);
     part_tags_.push_back(tags_of_part(data_, part, tags));
     const bool absorbs = m.solid && std::isfinite(m.attenuation_distance);
-    baked_[i].plain = !m.has_texture() && !part.has_colors && !part.has_normals && !absorbs;
-    if (baked_[i].plain && !m.unlit && part.triangle_count > 0) {
+    baked_[i].uniform = m.unlit || (!m.has_texture() && !part.has_colors);
+    baked_[i].plain = baked_[i].uniform && !part.has_normals && !absorbs;
+    if (baked_[i].uniform && !m.unlit && part.triangle_count > 0) {
       const BsdfParameters p = bsdf_parameters(m, VertexAttributes(data_, part.first_triangle, 0, 0), false);
       for (int side = 0; side < 2; ++side) baked_[i].bsdf[side] = Bsdf(p, side == 0, dielectrics_[part.material].get());
     }
@@ -163,8 +179,10 @@ void Scene::shade(Interaction& x, const Ray& ray) const {
   if (cos_o < kMinCos) n = glm::normalize(n + (kMinCos - cos_o) * x.wo);
   x.frame = make_frame(n);
 
-  if (!material.unlit)
-    x.bsdf = Bsdf(bsdf_parameters(material, attributes, part.has_colors), x.front, dielectrics_[part.material].get());
+  if (!baked_[x.part].uniform) {
+    x.own_ = Bsdf(bsdf_parameters(material, attributes, part.has_colors), x.front, dielectrics_[part.material].get());
+    x.bsdf_ = &x.own_;
+  }
 
   // A ray that meets the surface of a solid from behind has come through the solid.
   if (material.solid && !x.front && std::isfinite(material.attenuation_distance)) {

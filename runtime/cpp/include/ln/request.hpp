@@ -39,26 +39,26 @@ class Request {
   std::uint32_t dimension(std::uint32_t own) const { return depth_ * kPerVertex + own; }
 
   /// Can the receiver scatter samples, i.e. light from directions of the operator's choice?
-  bool takes_samples() const { return any(at_.bsdf.events() & kReceives & Events::DG); }
+  bool takes_samples() const { return any(at_.bsdf().events() & kReceives & Events::DG); }
 
   /// BSDF times |cos| for light from `wi`, and the solid-angle density with which the shared sample picks that direction.
   BsdfValue evaluate(const Vec3& wi) const {
     const Vec3 local = at_.frame.to_local(wi);
     if (!at_.side_agrees(wi, local.z)) return {};
     static_assert((kReceives & Events::DG) == (kSamples & Events::DG), "the shared sample picks what the receiver scatters");
-    return at_.bsdf.evaluate(at_.wo_local, local, kSamples);
+    return at_.bsdf().evaluate(at_.wo_local, local, kSamples);
   }
 
   /// The side of the surface from which emitters matter, as a normal; zero: both sides.
   Vec3 emitter_side() const {
-    if (at_.bsdf.transmits_smoothly()) return Vec3(0);
+    if (at_.bsdf().transmits_smoothly()) return Vec3(0);
     return at_.front ? at_.at.ng : -at_.at.ng;
   }
 
   /// Radiance that the irradiance `E` [W/m^2] becomes: diffuse reflection only.
   Color scatter_irradiance(const Color& E) const {
     if constexpr (!any(kReceives & Events::D)) return Color(0);
-    return at_.bsdf.diffuse_reflectance(at_.wo_local) * E * kInvPi;
+    return at_.bsdf().diffuse_reflectance(at_.wo_local) * E * kInvPi;
   }
 
   /// Is the way to an emitter free?
@@ -83,7 +83,7 @@ class Request {
     if (!sampled_) {
       sampled_ = true;
       BsdfSample s;
-      valid_ = at_.bsdf.sample(at_.wo_local, random_.get1(dimension(kBsdfLobe)), random_.get2(dimension(kBsdfDirection)), kSamples,
+      valid_ = at_.bsdf().sample(at_.wo_local, random_.get1(dimension(kBsdfLobe)), random_.get2(dimension(kBsdfDirection)), kSamples,
                                Carried::radiance, s);
       if (valid_) {
         const Vec3 wi = at_.frame.to_world(s.wi);

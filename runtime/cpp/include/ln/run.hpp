@@ -82,15 +82,15 @@ Color eye_radiance(const Network& network, Tracer& tracer, Ray ray, const Sample
       result += beta * scene.emitters().environment(ray.direction);
       return result;
     }
-    const Interaction at = scene.interaction(ray, hit);
+    const Interaction at(scene, ray, hit);
     beta *= at.transmittance;
     result += beta * scene.emitters().radiance(hit, at.wo);
 
     Request<Events::DG, Events::all> request(tracer, random, at, beta, depth + 1, RayKind::camera);
-    if (any(at.bsdf.events() & Events::DG)) result += beta * network.image(request);
+    if (any(at.bsdf().events() & Events::DG)) result += beta * network.image(request);
 
     // Follow a specular direction, if the point's sample is one.
-    if (!any(at.bsdf.events() & Events::S)) return result;
+    if (!any(at.bsdf().events() & Events::S)) return result;
     const BsdfRay* sample = request.sample();
     if (!sample || sample->event != Events::S) return result;
     beta *= sample->weight;

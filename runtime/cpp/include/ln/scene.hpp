@@ -26,21 +26,38 @@ struct TagRule {
   const char* glob;
 };
 
+class Scene;
+
 /// A point of a surface where light is scattered towards `wo`, with its BSDF.
-struct Interaction {
-  SurfacePosition at;
-  Frame frame;              // shading frame; its normal is on the side of wo
-  Vec3 wo{0, 0, 1};         // towards where the light is wanted, world space
-  Vec3 wo_local{0, 0, 1};
-  Bsdf bsdf;
-  Hit hit;
-  std::uint32_t part = 0;
-  bool front = true;        // wo is on the front side
-  Color transmittance{1};   // of the ray that led here, where it ran through an absorbing solid
+class Interaction {
+ public:
+  /// The surface that `ray` hit, seen from where the ray came from. `scene` must outlive it.
+  Interaction(const Scene& scene, const Ray& ray, const Hit& hit);
+  Interaction(const Interaction&) = delete;
+  Interaction& operator=(const Interaction&) = delete;
+
+  const Bsdf& bsdf() const { return *bsdf_; }
 
   /// Do `w` (world space) and its local direction agree about the side of the surface? Shading normals may differ from
   /// geometric ones; light must not leak through because of it.
   bool side_agrees(const Vec3& w, float local_z) const { return (glm::dot(w, at.ng) >= 0) == ((local_z >= 0) == front); }
+
+  SurfacePosition at;
+  Frame frame;              // shading frame; its normal is on the side of wo
+  Vec3 wo;                  // towards where the light is wanted, world space
+  Vec3 wo_local;
+  Hit hit;
+  std::uint32_t part;
+  bool front;               // wo is on the front side
+  Color transmittance{1};   // of the ray that led here, where it ran through an absorbing solid
+
+ private:
+  friend class Scene;
+
+  const Bsdf* bsdf_;        // the part's own, or own_
+  union {
+    Bsdf own_;              // where the material varies; trivially destructible
+  };
 };
 
 class Scene {
@@ -61,25 +78,6 @@ class Scene {
   /// Events that some surface of the scene can scatter by (conservative: from the ranges of textures).
   Events events() const { return events_; }
 
-  /// The surface that `ray` hit, seen from where the ray came from.
-  Interaction interaction(const Ray& ray, const Hit& hit) const {
-    Interaction x;
-    x.hit = hit;
-    x.part = data_.triangle_part[hit.triangle];
-    x.wo = -ray.direction;
-    locate(hit, x.at);
-    x.front = glm::dot(x.wo, x.at.ng) >= 0;
-    const Baked& material = baked_[x.part];
-    if (material.plain) {
-      x.bsdf = material.bsdf[x.front ? 0 : 1];
-      x.frame = make_frame(x.front ? x.at.ng : -x.at.ng);
-    } else {
-      shade(x, ray);
-    }
-    x.wo_local = x.frame.to_local(x.wo);
-    return x;
-  }
-
   /// Position, error bound and geometric normal at a hit.
   void locate(const Hit& hit, SurfacePosition& at) const {
     const UVec3 i = data_.triangles[hit.triangle];
@@ -91,10 +89,13 @@ class Scene {
   }
 
  private:
-  /// A part's material where nothing varies over the surface: `plain` surfaces skip all look-ups.
+  friend class Interaction;
+
+  /// What is known of a part's surface before any ray meets it.
   struct Baked {
-    bool plain = false;
-    Bsdf bsdf[2];  // seen from the front, from the back
+    bool plain = false;    // the triangles' own normals, one BSDF a side, nothing absorbed: no look-ups at all
+    bool uniform = false;  // one BSDF a side
+    Bsdf bsdf[2];          // seen from the front, from the back
   };
 
   void shade(Interaction& x, const Ray& ray) const;
@@ -107,5 +108,19 @@ class Scene {
   std::unique_ptr<Emitters> emitters_;
   Events events_ = Events::none;
 };
+
+inline Interaction::Interaction(const Scene& scene, const Ray& ray, const Hit& found)
+    : wo(-ray.direction), hit(found), part(scene.data_.triangle_part[found.triangle]) {
+  scene.locate(hit, at);
+  front = glm::dot(wo, at.ng) >= 0;
+  const Scene::Baked& baked = scene.baked_[part];
+  bsdf_ = &baked.bsdf[front ? 0 : 1];
+  if (baked.plain) {
+    frame = make_frame(front ? at.ng : -at.ng);
+  } else {
+    scene.shade(*this, ray);
+  }
+  wo_local = frame.to_local(wo);
+}
 
 }  // namespace ln

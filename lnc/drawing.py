@@ -99,9 +99,9 @@ def _layers(boxes: dict[str, _Box]) -> set[tuple[str, str]]:
     sources = {name: box.reads for name, box in boxes.items()}
     order = {name: i for i, name in enumerate(n for c in strong_components(sources) for n in c)}
     back: set[tuple[str, str]] = set()
-    for name in order:
+    for name, position in order.items():
         for source in sources[name]:
-            if order[source] >= order[name]:
+            if order[source] >= position:
                 back.add((source, name))
             else:
                 boxes[name].layer = max(boxes[name].layer, boxes[source].layer + 1)

@@ -14,10 +14,10 @@ def strong_components(sources: dict[str, list[str]]) -> list[list[str]]:
     stack: list[str] = []
     on_stack: set[str] = set()
     components: list[list[str]] = []
-    for root in sources:
+    for root, reads in sources.items():
         if root in number:
             continue
-        work = [(root, iter(sources[root]))]
+        work = [(root, iter(reads))]
         number[root] = low[root] = len(number)
         stack.append(root)
         on_stack.add(root)

@@ -6,8 +6,8 @@ import hashlib
 import os
 import pickle
 import sys
-import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -19,7 +19,7 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def data_root() -> Path:
-    """The folder that holds `ops_library`, `runtime`, `examples` and `CMakeLists.txt`: the checkout, or the wheel's data."""
+    """Holds `ops_library`, `runtime`, `examples` and `CMakeLists.txt`: the checkout, or the wheel's data."""
     installed = _PACKAGE / "_data"
     return installed if installed.is_dir() else _PACKAGE.parent
 
@@ -48,7 +48,7 @@ def cache_folder() -> Path:
     try:
         return Path.home() / ".cache" / "lnc"
     except RuntimeError:  # no home folder
-        return Path(tempfile.gettempdir()) / f"lnc-{os.getuid()}"
+        return Path("/tmp") / f"lnc-{os.getuid()}"
 
 
 def compiler_fingerprint() -> str:
@@ -73,7 +73,7 @@ def cached(kind: str, key: str, make: Callable[[], T]) -> T:
     if found is not None:
         try:
             return pickle.loads(found)  # type: ignore[no-any-return]
-        except Exception:  # noqa: BLE001 - whatever a broken file does, the value can be made
+        except Exception:  # whatever a broken file does, the value can be made
             pass
     value = make()
     _write_atomically(path, pickle.dumps(value, protocol=5))
@@ -94,14 +94,13 @@ def _read_trusted(path: Path) -> bytes | None:
 
 
 def _write_atomically(path: Path, payload: bytes) -> None:
+    temporary = path.with_name(f"{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name)
-        try:
-            with os.fdopen(descriptor, "wb") as file:
-                file.write(hashlib.sha256(payload).digest() + payload)
-            os.replace(temporary, path)
-        except OSError:
-            os.unlink(temporary)
+        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(hashlib.sha256(payload).digest() + payload)
+        os.replace(temporary, path)
     except OSError:
-        pass
+        with suppress(OSError):
+            temporary.unlink()

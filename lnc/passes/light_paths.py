@@ -13,8 +13,6 @@ On entry: a network with converters, its contents, its cycles sound. Only sets a
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from lnc.library import CONTENTS, SCATTERED, PathRule
 from lnc.network import Network, Node, PathReport, PathValue, Term
 from lnc.paths.automaton import Nfa, TooLarge, determinise
@@ -155,9 +153,9 @@ class _NetworkAutomaton:
                 value = node.parameter(name)
                 return value.value.expression if value and isinstance(value.value, PathValue) else tail
             case ast.PathConcat(items) | ast.PathUnion(items):
-                return replace(tail, items=tuple(self._filled(node, i) for i in items))
+                return tail.changed(items=tuple(self._filled(node, i) for i in items))
             case ast.PathRepeat(item):
-                return replace(tail, item=self._filled(node, item))
+                return tail.changed(item=self._filled(node, item))
         return tail
 
     # --- Languages ----------------------------------------------------------------------------------------------------

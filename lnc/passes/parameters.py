@@ -115,11 +115,12 @@ def _path(parameter: Parameter, path: ast.PathExpression, tags: Collection[str],
     if dfa.is_empty:
         raise ValueFault("no path fits this expression")
     shortest, longest = dfa.length_bounds()
-    if parameter.low is not None and parameter.high is not None:
-        if shortest < parameter.low or longest is None or longest > parameter.high:
-            one = parameter.low == parameter.high == 1
-            wanted = "one event" if one else f"{parameter.low:g} to {parameter.high:g} events"
-            raise ValueFault(f"exactly {wanted} is wanted" if one else f"{wanted} are wanted")
+    if parameter.low is None or parameter.high is None:
+        return value
+    if shortest < parameter.low or longest is None or longest > parameter.high:
+        one = parameter.low == parameter.high == 1
+        wanted = "exactly one event is" if one else f"{parameter.low:g} to {parameter.high:g} events are"
+        raise ValueFault(f"{wanted} wanted")
     return value
 
 

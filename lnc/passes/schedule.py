@@ -2,8 +2,8 @@
 
     image direct + caustic      nodes light, direct, photons, photons_tree, caustic; prepare photons, photons_tree
 
-On entry: a network with converters, sound cycles and known contents. On exit: all that code generation needs. Nodes that
-no result needs are left out.
+On entry: a network with converters, sound cycles and known contents. On exit: all that code generation needs.
+Nodes that no result needs are left out.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ from lnc.network import Network, Node, Schedule, ScheduledInput, ScheduledNode
 from lnc.passes.check_cycles import wire_sources
 
 CPP_WORDS = frozenset(
-    """alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t char32_t class compl
-    concept const consteval constexpr constinit const_cast continue co_await co_return co_yield decltype default delete do
-    double dynamic_cast else enum explicit export extern false float for friend goto if inline int long mutable namespace
-    new noexcept not not_eq nullptr operator or or_eq private protected public register reinterpret_cast requires return
-    short signed sizeof static static_assert static_cast struct switch template this thread_local throw true try typedef
-    typeid typename union unsigned using virtual void volatile wchar_t while xor xor_eq
-    main std ln assert errno stdin stdout stderr NULL EOF INFINITY NAN linux unix i386""".split()
+    """alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t char32_t class
+    compl concept const consteval constexpr constinit const_cast continue co_await co_return co_yield decltype
+    default delete do double dynamic_cast else enum explicit export extern false float for friend goto if
+    inline int long mutable namespace new noexcept not not_eq nullptr operator or or_eq private protected
+    public register reinterpret_cast requires return short signed sizeof static static_assert static_cast
+    struct switch template this thread_local throw true try typedef typeid typename union unsigned using
+    virtual void volatile wchar_t while xor xor_eq main std ln assert errno stdin stdout stderr NULL EOF
+    INFINITY NAN linux unix i386""".split()
 )
 
 

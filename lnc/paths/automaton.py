@@ -65,7 +65,7 @@ class Dfa:
         order = _topological(self)
         if order is None:
             return shortest, None
-        longest = {s: 0 for s in depth}
+        longest = dict.fromkeys(depth, 0)
         for state in reversed(order):
             for _, target in self.edges[state]:
                 longest[state] = max(longest[state], longest[target] + 1)

@@ -1,21 +1,15 @@
-"""The syntax tree: one frozen dataclass per rule of the grammar.
+"""The syntax tree: one immutable record per rule of the grammar.
 
 Spans and the place of comments do not count when trees are compared.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
+from lnc.record import Record
 from lnc.source import Span
 
 
-def _span() -> Span:
-    return field(compare=False, repr=False)  # type: ignore[no-any-return]
-
-
-@dataclass(frozen=True)
-class Comments:
+class Comments(Record):
     """Comments that belong to a statement, as written; `blank`: an empty line stands before it."""
 
     leading: tuple[str, ...] = ()
@@ -26,73 +20,65 @@ class Comments:
 # --- Light paths ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class TagRef:
+class TagRef(Record):
     """`@mirror`, `@!mirror`, `@delta`."""
 
     name: str
     negated: bool
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class PathEvents:
+class PathEvents(Record):
     """One event: a letter, or several to choose from. `.` is "DGS"."""
 
     letters: str
     tag: TagRef | None
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class PathName:
+class PathName(Record):
     """A name in a path: a tag; in a declaration also a port or a path parameter."""
 
     name: str
     tag: TagRef | None
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class PathTagged:
+class PathTagged(Record):
     """`(D|G)@mirror`: the tag holds for every event inside."""
 
     item: PathExpression
     tag: TagRef
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class PathConcat:
+class PathConcat(Record):
     """Two or more paths in a row."""
 
     items: tuple[PathExpression, ...]
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class PathUnion:
+class PathUnion(Record):
     """Two or more alternatives."""
 
     items: tuple[PathExpression, ...]
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class PathRepeat:
+class PathRepeat(Record):
     """`*` is (0, None), `+` (1, None), `?` (0, 1), `{m,n}` (m, n)."""
 
     item: PathExpression
     low: int
     high: int | None
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class PathEmpty:
+class PathEmpty(Record):
     """`()`: no event at all."""
 
-    span: Span = _span()
+    span: Span
 
 
 PathExpression = PathEvents | PathName | PathTagged | PathConcat | PathUnion | PathRepeat | PathEmpty
@@ -100,40 +86,35 @@ PathExpression = PathEvents | PathName | PathTagged | PathConcat | PathUnion | P
 # --- Values of parameters ---------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class NumberValue:
+class NumberValue(Record):
     """A number with its suffix or unit, as written: `-3`, `200k`, `1%`."""
 
     text: str
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class TextValue:
+class TextValue(Record):
     """A string, unescaped."""
 
     text: str
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class FlagValue:
+class FlagValue(Record):
     value: bool
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class NameValue:
+class NameValue(Record):
     """A single name: a choice, a tag, a wire or a path, as the declared type says."""
 
     name: str
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class PathLiteral:
+class PathLiteral(Record):
     path: PathExpression
-    span: Span = _span()
+    span: Span
 
 
 Value = NumberValue | TextValue | FlagValue | NameValue | PathLiteral
@@ -141,56 +122,50 @@ Value = NumberValue | TextValue | FlagValue | NameValue | PathLiteral
 # --- Wires ------------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class WireName:
+class WireName(Record):
     name: str
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class Argument:
+class Argument(Record):
     """`name = value` in a call."""
 
     name: str
     value: Value
-    span: Span = _span()
-    name_span: Span = _span()
+    span: Span
+    name_span: Span
 
 
-@dataclass(frozen=True)
-class Call:
+class Call(Record):
     """`Op(wire, ..., parameter = value)`."""
 
     op: str
     inputs: tuple[WireExpression, ...]
     arguments: tuple[Argument, ...]
-    span: Span = _span()
-    op_span: Span = _span()
+    span: Span
+    op_span: Span
 
 
-@dataclass(frozen=True)
-class Cast:
+class Cast(Record):
     """`wire as QuadTree(error = 1%)`: converts here, with these parameters."""
 
     wire: WireExpression
     representation: str
     arguments: tuple[Argument, ...]
-    span: Span = _span()
-    representation_span: Span = _span()
+    span: Span
+    representation_span: Span
 
 
-@dataclass(frozen=True)
-class SumTerm:
+class SumTerm(Record):
     negative: bool
     wire: WireExpression
 
 
-@dataclass(frozen=True)
-class WireSum:
+class WireSum(Record):
     """`a + b - c`, two terms or more; the first is never negative."""
 
     terms: tuple[SumTerm, ...]
-    span: Span = _span()
+    span: Span
 
 
 WireExpression = WireName | Call | Cast | WireSum
@@ -198,100 +173,88 @@ WireExpression = WireName | Call | Cast | WireSum
 # --- Statements -------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class NetworkName:
+class NetworkName(Record):
     name: str
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class TagGlob:
+class TagGlob(Record):
     kind: str
     glob: str
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class TagStatement:
+class TagStatement(Record):
     name: str
     globs: tuple[TagGlob, ...]
     comments: Comments
-    span: Span = _span()
-    name_span: Span = _span()
+    span: Span
+    name_span: Span
 
 
-@dataclass(frozen=True)
-class Equation:
+class Equation(Record):
     name: str
     representation: str | None
     wire: WireExpression
     comments: Comments
-    span: Span = _span()
-    name_span: Span = _span()
+    span: Span
+    name_span: Span
 
 
-@dataclass(frozen=True)
-class Expect:
+class Expect(Record):
     path: PathExpression
     at_most: bool
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class ImageStatement:
+class ImageStatement(Record):
     wire: WireExpression
     layers: bool
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class TapStatement:
+class TapStatement(Record):
     wire: WireExpression
     file: str
     comments: Comments
-    span: Span = _span()
-    file_span: Span = _span()
+    span: Span
+    file_span: Span
 
 
-@dataclass(frozen=True)
-class LightmapStatement:
+class LightmapStatement(Record):
     wire: WireExpression
     file: str
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class ProbeStatement:
+class ProbeStatement(Record):
     wire: WireExpression
     sensors: str
     file: str
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class Use:
+class Use(Record):
     file: str
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class MacroInput:
+class MacroInput(Record):
     """`in: Points`, or `n = 3`: a wire with its representation, or a parameter with its default."""
 
     name: str
     representation: str | None
     default: Value | None
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class Macro:
+class Macro(Record):
     """A LightOp made of others; the equation `out` is its result."""
 
     name: str
@@ -300,33 +263,30 @@ class Macro:
     body: tuple[Equation, ...]
     comments: Comments
     end_comments: tuple[str, ...]
-    span: Span = _span()
-    name_span: Span = _span()
+    span: Span
+    name_span: Span
 
 
 # --- Declarations of the operator library -----------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class RepresentationDeclaration:
+class RepresentationDeclaration(Record):
     name: str
     doc: str
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class PortDeclaration:
+class PortDeclaration(Record):
     name: str
     representation: str
     complete: bool
     variadic: bool
     doc: str
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class ParameterDeclaration:
+class ParameterDeclaration(Record):
     name: str
     type: str
     choices: tuple[str, ...]
@@ -335,43 +295,38 @@ class ParameterDeclaration:
     high: NumberValue | None
     doc: str
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class PathsDeclaration:
+class PathsDeclaration(Record):
     content: str
     path: PathExpression
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class BiasDeclaration:
+class BiasDeclaration(Record):
     bound: NumberValue
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class ConverterDeclaration:
+class ConverterDeclaration(Record):
     cost: NumberValue
     loss: str
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class RecursionDeclaration:
+class RecursionDeclaration(Record):
     kind: str
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
-@dataclass(frozen=True)
-class PrepareDeclaration:
+class PrepareDeclaration(Record):
     comments: Comments
-    span: Span = _span()
+    span: Span
 
 
 OperatorItem = (
@@ -384,8 +339,7 @@ OperatorItem = (
 )
 
 
-@dataclass(frozen=True)
-class OperatorDeclaration:
+class OperatorDeclaration(Record):
     name: str
     ports: tuple[PortDeclaration, ...]
     output: str
@@ -393,8 +347,8 @@ class OperatorDeclaration:
     doc: str
     comments: Comments
     end_comments: tuple[str, ...]
-    span: Span = _span()
-    name_span: Span = _span()
+    span: Span
+    name_span: Span
 
 
 Statement = (
@@ -413,8 +367,7 @@ Statement = (
 )
 
 
-@dataclass(frozen=True)
-class File:
+class File(Record):
     statements: tuple[Statement, ...]
     end_comments: tuple[str, ...]  # after the last statement
-    span: Span = _span()
+    span: Span

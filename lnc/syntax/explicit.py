@@ -6,8 +6,6 @@ caustic = NNDensity(photons)        photons_tree = KDPhotonTree(photons)
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from lnc.network import Network, Node, Term
 from lnc.source import Span
 from lnc.syntax import ast
@@ -28,14 +26,14 @@ def explicit(file: ast.File, network: Network) -> str:
         match statement:
             case ast.Equation(name) if name in nodes:
                 same = _equation(nodes[name], statement.comments)
-                statements.append(replace(same, representation=statement.representation))
+                statements.append(same.changed(representation=statement.representation))
             case ast.ImageStatement() if network.image is not None:
-                statements.append(replace(statement, wire=_wire(network.image.terms, statement.span)))
+                statements.append(statement.changed(wire=_wire(network.image.terms, statement.span)))
             case ast.TapStatement():
-                statements.append(replace(statement, wire=_wire(next(taps).terms, statement.span)))
+                statements.append(statement.changed(wire=_wire(next(taps).terms, statement.span)))
             case _:
                 statements.append(statement)
-    return print_file(replace(file, statements=tuple(_tidy(statements))))
+    return print_file(file.changed(statements=tuple(_tidy(statements))))
 
 
 def _equation(node: Node, comments: ast.Comments) -> ast.Equation:
@@ -63,8 +61,8 @@ def _tidy(statements: list[ast.Statement]) -> list[ast.Statement]:
         before, here = tidy[i - 1], tidy[i]
         fresh = isinstance(before, ast.Equation) and before.comments == ast.Comments()
         if here.comments.blank and fresh and isinstance(here, ast.Statement) and _follows(before, here):
-            tidy[i - 1] = replace(before, comments=ast.Comments((), "", True))
-            tidy[i] = replace(here, comments=replace(here.comments, blank=False))
+            tidy[i - 1] = before.changed(comments=ast.Comments((), "", True))
+            tidy[i] = here.changed(comments=here.comments.changed(blank=False))
     return tidy
 
 

@@ -24,11 +24,11 @@ def main(argv: list[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     arguments, rest = _parser().parse_known_args(argv)
     if rest and arguments.command != "run":
-        return _fail(f"unknown argument {rest[0]!r}; lnc {arguments.command} --help lists what there is")
+        return fail(f"unknown argument {rest[0]!r}; lnc {arguments.command} --help lists what there is")
     arguments.rest = rest
     for folder in getattr(arguments, "ops", ()):
         if not Path(folder).is_dir():
-            return _fail(f"--ops {folder}: is not a folder")
+            return fail(f"--ops {folder}: is not a folder")
     try:
         status: int = arguments.run(arguments)
         sys.stdout.flush()
@@ -75,6 +75,7 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--emit-cpp", metavar="FILE", help="also write the C++ text")
     build.add_argument("--scene", metavar="SCENE")
     build.add_argument("--reference", metavar="EXPR")
+    build.add_argument("--portable", action="store_true", help="code for any x86-64 processor instead of this one")
     build.add_argument("--dump-after", action="append", default=[], metavar="STAGE")
     build.set_defaults(run=_compile)
 
@@ -100,7 +101,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _fail(message: str) -> int:
+def fail(message: str) -> int:
     from lnc.diagnostics.format import printable
 
     print(f"lnc: {printable(message)}", file=sys.stderr)
@@ -122,7 +123,7 @@ def compile_or_report(path: str, ops: list[str]) -> tuple[Result | None, int]:
     try:
         result = compile_file(path, tuple(ops))
     except Unreadable as error:
-        return None, _fail(str(error))
+        return None, fail(str(error))
     report(result.diagnostics)
     return result, WRONG if result.failed else FINE
 
@@ -171,7 +172,7 @@ def _explain(arguments: argparse.Namespace) -> int:
         print(print_page(found), end="")
         return FINE
     if arguments.what[:2].upper() == "LN" and arguments.what[2:].isdigit():
-        return _fail(f"no code is called {arguments.what}")
+        return fail(f"no code is called {arguments.what}")
     result, status = compile_or_report(arguments.what, arguments.ops)
     if result is None or result.typed is None or result.schedule is None:
         return status
@@ -214,7 +215,7 @@ def _fmt(arguments: argparse.Namespace) -> int:
             else:
                 write_text(path, text)
         except Unreadable as error:
-            status = _fail(str(error))
+            status = fail(str(error))
     return status
 
 
@@ -236,13 +237,13 @@ def _fmt_explicit(path: str, arguments: argparse.Namespace) -> int:
 
 
 def _compile(arguments: argparse.Namespace) -> int:
-    from lnc.build import compile_command
+    from lnc.programs import compile_command
 
     return int(compile_command(arguments))
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from lnc.build import run_command
+    from lnc.programs import run_command
 
     return int(run_command(arguments))
 
@@ -251,7 +252,7 @@ def _graph(arguments: argparse.Namespace) -> int:
     from lnc.driver import Unreadable, write_text
 
     if not arguments.output.lower().endswith(".svg"):
-        return _fail("a graph is written as .svg")
+        return fail("a graph is written as .svg")
     result, status = compile_or_report(arguments.file, arguments.ops)
     if result is None or result.typed is None or result.schedule is None:
         return status
@@ -260,7 +261,7 @@ def _graph(arguments: argparse.Namespace) -> int:
     try:
         write_text(arguments.output, draw(result))
     except Unreadable as error:
-        return _fail(str(error))
+        return fail(str(error))
     return status
 
 
@@ -279,7 +280,7 @@ def _ops(arguments: argparse.Namespace) -> int:
         print(f"representation {arguments.name}\n\n{library.representations[arguments.name].doc}")
     else:
         help = did_you_mean(arguments.name, [*library.operators, *library.representations])
-        return _fail(f"no operator is called {arguments.name}" + (f": {help}" if help else ""))
+        return fail(f"no operator is called {arguments.name}" + (f": {help}" if help else ""))
     return WRONG if faults else FINE
 
 

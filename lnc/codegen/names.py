@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 # Members of the generated struct, and names that its functions use.
-RESERVED = frozenset({"Network", "image", "prepare", "request", "next", "step", "context", "ln", "main", "std", "value"})
+RESERVED = frozenset(
+    {"Network", "image", "prepare", "request", "next", "step", "context", "ln", "main", "std", "value"}
+)
 
 
 def unique_names(wanted: Iterable[str], prefix: str = "", taken: Iterable[str] = ()) -> dict[str, str]:

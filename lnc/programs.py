@@ -1,0 +1,97 @@
+"""`lnc compile` and `lnc run`: from a network's file to a program."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import sys
+from pathlib import Path
+
+from lnc.build import BuildError, BuildOptions, build_program, program_path
+from lnc.cli import FINE, USAGE, WRONG, fail, report
+from lnc.driver import STAGES, Result, Unreadable, compile_file, describe_paths, write_text
+from lnc.locations import library_folders
+
+
+def compile_command(arguments: argparse.Namespace) -> int:
+    """`lnc compile FILE -o PROGRAM`."""
+    for option in ("scene", "reference"):
+        if getattr(arguments, option) is not None:
+            return fail(f"--{option} is not supported yet")
+    if arguments.file is None:
+        return fail("compile needs a network: lnc compile FILE -o PROGRAM")
+    unknown = [stage for stage in arguments.dump_after if stage not in STAGES]
+    if unknown:
+        return fail(f"no stage is called {unknown[0]}; there are: {', '.join(STAGES)}")
+    if arguments.output is None and arguments.emit_cpp is None and not arguments.dump_after:
+        return fail("compile needs the program's name: -o PROGRAM")
+
+    result, status = _read(arguments)
+    if result is None or status != FINE:
+        return status
+    cpp = write_cpp(result)
+    try:
+        if arguments.emit_cpp is not None:
+            write_text(arguments.emit_cpp, cpp)
+    except Unreadable as error:
+        return fail(str(error))
+    if arguments.output is None:
+        return FINE
+    return _build(cpp, arguments, Path(arguments.output).absolute())
+
+
+def run_command(arguments: argparse.Namespace) -> int:
+    """`lnc run FILE SCENE [program options]`: becomes the program."""
+    result, status = _read(arguments)
+    if result is None or status != FINE or result.schedule is None:
+        return status
+    cpp = write_cpp(result)
+    name = f"{hashlib.sha256(cpp.encode()).hexdigest()[:16]}/{result.schedule.network}"
+    try:
+        program = program_path(Path(name))
+    except BuildError as error:
+        return fail(str(error))
+    status = _build(cpp, arguments, program)
+    if status != FINE:
+        return status
+    sys.stdout.flush()
+    os.execv(program, [str(program), arguments.scene, *arguments.rest])
+
+
+def write_cpp(result: Result) -> str:
+    """The C++ text of a network that has passed."""
+    from lnc.codegen.view import program_view
+    from lnc.codegen.write import write_program
+
+    assert result.schedule is not None and result.typed is not None
+    paths = describe_paths(result.typed)
+    wires = {wire: " | ".join(expression for _, expression in contents) for wire, contents in paths.wires.items()}
+    source = result.file.span.source.text
+    return write_program(program_view(result.schedule, source, paths.image or "", wires))
+
+
+def _read(arguments: argparse.Namespace) -> tuple[Result | None, int]:
+    """The network, with its diagnostics printed, and the exit status so far."""
+    wanted = getattr(arguments, "dump_after", [])
+
+    def dump(stage: str, text: str) -> None:
+        if stage in wanted:
+            print(text, end="" if text.endswith("\n") else "\n")
+
+    try:
+        result = compile_file(arguments.file, tuple(arguments.ops), dump if wanted else None)
+    except Unreadable as error:
+        return None, fail(str(error))
+    report(result.diagnostics)
+    return result, WRONG if result.failed or result.schedule is None else FINE
+
+
+def _build(cpp: str, arguments: argparse.Namespace, output: Path) -> int:
+    options = BuildOptions(portable=getattr(arguments, "portable", False))
+    try:
+        build_program(cpp, library_folders(tuple(arguments.ops)), output, options)
+    except BuildError as error:
+        print(f"lnc: {error}", file=sys.stderr)
+        return USAGE
+    return FINE

@@ -1,27 +1,28 @@
 """The spine: the rooms that a network walks through, in order.
 
-parse -> resolve -> typecheck -> insert_converters -> check_cycles -> contents -> schedule   (-> codegen, build)
-                                                                           \\-> light_paths  (for explain, graph)
+parse -> expand_macros -> resolve -> typecheck -> insert_converters -> check_cycles -> contents -> schedule
+                                     (-> light_paths, for explain and graph)                (-> codegen, build)
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from lnc.diagnostics import Diagnostic, InternalError, Reporter
+from lnc.diagnostics import Diagnostic, InternalError, Related, Reporter
 from lnc.library import Library
 from lnc.library_reader import load_library
 from lnc.network import PathReport, Schedule, TypedNetwork
 from lnc.passes.check_cycles import check_cycles
 from lnc.passes.contents import contents
+from lnc.passes.expand_macros import expand_macros
 from lnc.passes.insert_converters import insert_converters
 from lnc.passes.resolve import resolve
 from lnc.passes.schedule import print_schedule, schedule
 from lnc.passes.typecheck import typecheck
-from lnc.source import SourceFile
+from lnc.source import SourceFile, Span
 from lnc.syntax import ast
 from lnc.syntax.parse import parse
 
@@ -90,10 +91,15 @@ def compile_network(source: SourceFile, library: Library, dump: Dump | None = No
     reporter = Reporter()
     file = parse(source, reporter)
     _dump_text(dump, "parse", file)
-    name = _default_name(source.name)
-    network = resolve(file, name, library, reporter)
+    expanded = expand_macros(file, set(library.operators), _read_used, reporter)
+    file = expanded.file
+    network = resolve(file, _default_name(source.name), library, reporter, expanded.broken)
+
+    def result(typed: TypedNetwork | None, found: dict[str, tuple[str, ...]], plan: Schedule | None) -> Result:
+        return Result(file, typed, found, plan, _with_calls(reporter.sorted(), expanded.calls))
+
     if reporter.failed:
-        return Result(file, None, {}, None, reporter.sorted())
+        return result(None, {}, None)
     typed = typecheck(network, reporter)
     if not reporter.failed:
         typed = insert_converters(typed, library, reporter)
@@ -101,7 +107,7 @@ def compile_network(source: SourceFile, library: Library, dump: Dump | None = No
     if not reporter.failed:
         check_cycles(typed.network, reporter)
     if reporter.failed:
-        return Result(file, None, {}, None, reporter.sorted())
+        return result(None, {}, None)
     found = contents(typed.network, reporter)
     plan = None if reporter.failed else schedule(typed.network, found)
     if dump is not None and plan is not None:
@@ -109,7 +115,7 @@ def compile_network(source: SourceFile, library: Library, dump: Dump | None = No
 
         dump("insert_converters", explicit(file, typed.network))
         dump("schedule", print_schedule(plan))
-    return Result(file, typed, found, plan, reporter.sorted())
+    return result(typed, found, plan)
 
 
 def describe_paths(typed: TypedNetwork) -> PathReport:
@@ -137,6 +143,27 @@ def _check_inserted(typed: TypedNetwork, reporter: Reporter) -> None:
             for term in given.terms:
                 if typed.representations[term.node] != given.port.representation:
                     raise InternalError(f"{node.name}.{given.port.name} reads {term.node} of another representation")
+
+
+def _read_used(name: str, source: SourceFile) -> SourceFile:
+    """The file of a `use`, relative to the file it stands in."""
+    try:
+        return read_source(str(Path(source.name).parent / name))
+    except Unreadable as error:
+        raise OSError(str(error)) from error
+
+
+def _with_calls(diagnostics: list[Diagnostic], calls: dict[Span, Span]) -> list[Diagnostic]:
+    """A mistake inside a macro is also shown where the macro is called."""
+    shown: list[Diagnostic] = []
+    for diagnostic in diagnostics:
+        span = diagnostic.span
+        for macro, call in calls.items():
+            if macro.source is span.source and macro.start <= span.start < macro.end:
+                called = Related(call, "in this call of the macro")
+                diagnostic = replace(diagnostic, related=(*diagnostic.related, called))
+        shown.append(diagnostic)
+    return shown
 
 
 def _dump_text(dump: Dump | None, stage: str, file: ast.File) -> None:

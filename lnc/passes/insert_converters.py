@@ -16,6 +16,7 @@ from dataclasses import replace
 from lnc.conversions import cheapest_chains
 from lnc.diagnostics import Related, Reporter
 from lnc.library import Library, Operator, snake_case
+from lnc.naming import Names
 from lnc.network import Input, Node, ParameterValue, Term, TypedNetwork
 from lnc.passes.parameters import parameter_value
 from lnc.source import Span
@@ -33,7 +34,7 @@ class _Inserter:
         self.reporter = reporter
         self.representations = dict(typed.representations)
         self.nodes: list[Node] = []
-        self.names = {node.name for node in typed.network.nodes}
+        self.names = Names(node.name for node in typed.network.nodes)
         self.shared: dict[tuple[tuple[tuple[str, float], ...], str], str] = {}
         self.definitions = {node.name: node for node in typed.network.nodes}
 
@@ -102,11 +103,7 @@ class _Inserter:
         return self.shared[key]
 
     def _add(self, name: str, op: Operator, source: Input, reason: str, span: Span, statement: Span) -> str:
-        free, number = name, 1
-        while free in self.names:
-            number += 1
-            free = f"{name}_{number}"
-        self.names.add(free)
+        free = self.names.free(name)
         self.representations[free] = op.output
         defaults = [parameter_value(p, None, (), self.reporter) for p in op.parameters]
         parameters: tuple[ParameterValue, ...] = tuple(v for v in defaults if v is not None)

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 from lnc.conversions import cheapest_chains
 from lnc.diagnostics import Related, Reporter, did_you_mean, quote
-from lnc.library import Library, Operator, Parameter, Port, snake_case
+from lnc.library import Library, Operator, Parameter, Port
+from lnc.naming import Names
 from lnc.network import Expectation, Image, Input, Network, Node, ParameterValue, Tag, Tap, Term
 from lnc.passes.parameters import parameter_value
 from lnc.paths.language import tags_in
@@ -25,9 +26,11 @@ from lnc.syntax import ast
 TAG_KINDS = ("material", "mesh", "node")
 
 
-def resolve(file: ast.File, name: str, library: Library, reporter: Reporter) -> Network:
-    """The network of a file; `name` is its name if the text gives none."""
-    return _Resolver(file, library, reporter).run(name)
+def resolve(
+    file: ast.File, name: str, library: Library, reporter: Reporter, broken: frozenset[str] = frozenset()
+) -> Network:
+    """The network of a file; `name` is its name if the text gives none. Wires in `broken` have been reported."""
+    return _Resolver(file, library, reporter, broken).run(name)
 
 
 @dataclass(frozen=True)
@@ -39,14 +42,15 @@ class _Home:
 
 
 class _Resolver:
-    def __init__(self, file: ast.File, library: Library, reporter: Reporter) -> None:
+    def __init__(self, file: ast.File, library: Library, reporter: Reporter, broken: frozenset[str]) -> None:
         self.file = file
+        self.broken = broken
         self.library = library
         self.reporter = reporter
         self.equations: dict[str, ast.Equation] = {}
         self.tags: dict[str, Tag] = {}
         self.nodes: list[Node] = []
-        self.names: set[str] = set()
+        self.names = Names(())
         self.made: set[str] = set()  # names in `nodes`
         self.used: set[str] = set()
         self.ends: dict[str, str | None] = {}  # second names -> the wire they stand for
@@ -109,7 +113,7 @@ class _Resolver:
                     self._twice(statement.name_span, f"the wire {quote(statement.name)} is defined twice", first)
                 else:
                     self.equations[statement.name] = statement
-                    self.names.add(statement.name)
+                    self.names.free(statement.name)
             elif isinstance(statement, ast.TagStatement):
                 if statement.name in self.tags:
                     first = self.tags[statement.name].span
@@ -179,7 +183,7 @@ class _Resolver:
             case ast.WireName():
                 return self._wire_name(wire)
             case ast.Call(op):
-                name = self._derived(home.name, op)
+                name = self.names.derived(home.name, op)
                 self._call(wire, name, "nested", home)
                 return (Term(name, 1.0, wire.span),) if name in self.made else None
             case ast.Cast():
@@ -207,6 +211,8 @@ class _Resolver:
         return (Term(end, 1.0, wire.span),)
 
     def _unknown_wire(self, wire: ast.WireName) -> None:
+        if wire.name in self.broken:
+            return
         message = f"no wire is called {quote(wire.name)}"
         if wire.name in self.library.operators:
             help: str | None = f"'{wire.name}' is an operator: write {wire.name}(...)"
@@ -215,19 +221,6 @@ class _Resolver:
         else:
             help = did_you_mean(wire.name, self.equations)
         self.reporter.error("LN0102", wire.span, message, help=help)
-
-    def _derived(self, base: str, op: str) -> str:
-        """A free name for a node without one: `caustic` and KDPhotonTree give `caustic_tree`."""
-        word = snake_case(op)[:100].rsplit("_", 1)[-1] or "wire"
-        return self._free(f"{base}_{word}")
-
-    def _free(self, name: str) -> str:
-        free, number = name, 1
-        while free in self.names:
-            number += 1
-            free = f"{name}_{number}"
-        self.names.add(free)
-        return free
 
     # --- Calls --------------------------------------------------------------------------------------------------------
 
@@ -354,7 +347,7 @@ class _Resolver:
             return None
         if len(terms) > 1:
             sum_op = self.library.operators["Sum"]
-            summed = self._derived(home.name, "Sum")
+            summed = self.names.derived(home.name, "Sum")
             self._add(summed, sum_op, (Input(sum_op.ports[0], terms, cast.wire.span),), (), "nested", home, cast.span)
             terms = (Term(summed, 1.0, cast.wire.span),)
         chains = cheapest_chains(self.library, found, cast.representation)
@@ -373,7 +366,7 @@ class _Resolver:
             if parameters is None:
                 return None
             last = op is chains[0][-1]
-            node = name if last and name else self._derived(home.name, op.name)
+            node = name if last and name else self.names.derived(home.name, op.name)
             origin = "equation" if last and name else "nested"
             self._add(node, op, (Input(op.ports[0], terms, cast.wire.span),), parameters, origin, home, cast.span)
             terms = (Term(node, 1.0, cast.span),)

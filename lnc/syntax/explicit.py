@@ -22,7 +22,7 @@ def explicit(file: ast.File, network: Network) -> str:
     statements: list[ast.Statement] = []
     taps = iter(network.taps)
     for statement in file.statements:
-        statements += [_equation(node, ast.Comments()) for node in added.get(statement.span, ())]
+        statements += [_equation(node, ast.Comments()) for node in added.pop(statement.span, ())]
         match statement:
             case ast.Equation(name) if name in nodes:
                 same = _equation(nodes[name], statement.comments)

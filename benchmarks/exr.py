@@ -1,4 +1,6 @@
-"""Read and write OpenEXR pictures as numpy arrays, and show them: `python -m benchmarks.exr IN.exr OUT.png [--exposure STOPS]`.
+"""Read and write OpenEXR pictures as numpy arrays, and show them:
+
+    python -m benchmarks.exr IN.exr OUT.png [--exposure STOPS]
 
 Reads single-part scan-line files, uncompressed or zipped, without any library: that is what our programs write. Other
 files are handed to Mitsuba where it is installed.

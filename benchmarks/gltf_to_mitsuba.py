@@ -11,8 +11,8 @@ radiance, and materials are Mitsuba's own where it has the same ones:
 - polished glass: `dielectric` where it is solid, `thindielectric` where it is not;
 - directional light: `directional`; point light: `point`.
 
-Coloured mirrors, rough materials and spot lights are Python plug-ins (mitsuba_plugins.py): exact for mirrors and
-spots, without compensation of multiple scattering for rough surfaces. Anything else raises UnsupportedScene.
+Coloured mirrors, rough materials and spot lights are Python plug-ins with the runtime's formulas
+(mitsuba_plugins.py). Anything else raises UnsupportedScene.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ def mean_and_variance(images: Sequence[Image]) -> tuple[Image, Image]:
 
 @dataclass(frozen=True)
 class BlockTest:
-    """`z[i, j]` of each block, in the channel that is furthest off; `limit` is exceeded by chance with probability 1 %."""
+    """`z[i, j]` of each block, in the channel that is furthest off; chance exceeds `limit` with probability 1 %."""
 
     z: Image
     difference: Image

@@ -1,4 +1,6 @@
-"""Reference pictures by Mitsuba 3's path tracer, kept in a folder: `python -m benchmarks.reference SCENE... --cache FOLDER`.
+"""Reference pictures by Mitsuba 3's path tracer, kept in a folder:
+
+    python -m benchmarks.reference SCENE... --cache FOLDER [--samples N]
 
 A reference is an EXR with the picture and a layer `variance`, the variance of every pixel's value, so that comparisons
 can take the reference's own noise off. More samples continue nothing: they make a new file.
@@ -92,9 +94,8 @@ def main() -> None:
         result = reference(scene, width, height, options.samples, options.cache)
         noise = float(np.mean(result.variance / (result.image**2 + 0.01)))
         file = reference_file(scene, width, height, options.samples, options.cache)
-        print(
-            f"{file}: mean {result.image.mean():.5f}, relMSE of its own {noise:.2e}, {time.perf_counter() - start:.1f} s"
-        )
+        seconds = time.perf_counter() - start
+        print(f"{file}: mean {result.image.mean():.5f}, relMSE of its own {noise:.2e}, {seconds:.1f} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -15,9 +15,9 @@ import pytest
 SCENES = Path(__file__).resolve().parent.parent / "examples" / "scenes"
 sys.path.insert(0, str(SCENES))
 
-import closed_forms
-import make_scenes
-import shapes
+import closed_forms  # noqa: E402
+import make_scenes  # noqa: E402
+import shapes  # noqa: E402
 
 FILES = sorted(make_scenes.SCENES)
 

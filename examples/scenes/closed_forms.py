@@ -59,7 +59,7 @@ def point_irradiance(position: Vector, intensity: float, point: Vector, normal: 
 
 
 def spot_falloff(spot_direction: Vector, to_receiver: Vector, inner: float, outer: float) -> float:
-    """The angular attenuation of KHR_lights_punctual's reference code; both directions are unit, away from the light."""
+    """The angular attenuation of KHR_lights_punctual's reference code; both directions lead away from the light."""
     scale = 1 / max(0.001, math.cos(inner) - math.cos(outer))
     offset = -math.cos(outer) * scale
     attenuation = min(1.0, max(0.0, dot(spot_direction, to_receiver) * scale + offset))

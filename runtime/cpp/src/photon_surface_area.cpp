@@ -73,58 +73,23 @@ class Sweep {
   }
 
   void add(const LocalTriangle& triangle) {
-    // Intersect the triangle with each direction: lower <= distance in the plane <= upper.
-    alignas(32) float lower[kDirections], upper[kDirections];
-    std::fill(lower, lower + kDirections, 0.0f);
-    std::fill(upper, upper + kDirections, 2.0f);
-    for (int e = 0; e < 3; ++e) {
-      const Vec3& a = triangle.corner[e];
-      const Vec3& b = triangle.corner[e == 2 ? 0 : e + 1];
-      const float nx = b.y - a.y, ny = a.x - b.x;  // outwards
-      const float c = a.x * b.y - a.y * b.x;
-      for (int j = 0; j < kDirections; ++j) {
-        const float d = nx * kDirection.x[j] + ny * kDirection.y[j];
-        const float t = c / d;
-        lower[j] = d < 0 ? std::max(lower[j], t) : (d == 0 && c < 0) ? 3.0f : lower[j];
-        upper[j] = d > 0 ? std::min(upper[j], t) : upper[j];
-      }
-    }
-    // Height over the tangent plane: h0 + g * distance, within the neighbourhood's slope.
-    const Vec3 normal = glm::cross(triangle.corner[1] - triangle.corner[0], triangle.corner[2] - triangle.corner[0]);
+    const auto [a, b, c] = triangle.corner;
+    const Vec3 low = glm::min(a, glm::min(b, c)), high = glm::max(a, glm::max(b, c));
+    const Vec3 nearest = glm::max(glm::max(low, -high), Vec3(0));
+    if (glm::dot(nearest, nearest) >= 1) return;
+    const Vec3 normal = glm::cross(b - a, c - a);
     if (!(normal.z > 0)) return;
-    const float h0 = glm::dot(normal, triangle.corner[0]) / normal.z;
-    const float gx = -normal.x / normal.z, gy = -normal.y / normal.z;
-    const float tilt = glm::length(normal) / normal.z;  // area over projected area
-    alignas(32) float from[kDirections], to[kDirections], density[kDirections];
-    bool any = false;
-    for (int j = 0; j < kDirections; ++j) {
-      const float g = gx * kDirection.x[j] + gy * kDirection.y[j];
-      constexpr float kSlope = Neighbourhood::kMaxSlope;
-      const float near = std::max(lower[j], std::max(h0 / (kSlope - g), -h0 / (kSlope + g)));
-      const float far = std::max(near, upper[j]);
-      const float h_near = h0 + g * near, h_far = h0 + g * far;
-      from[j] = near * near + h_near * h_near;
-      to[j] = std::min(far * far + h_far * h_far, 1.0f);
-      any |= to[j] > from[j];
-      // Area element over that of the kernel's distance d: rho drho / (d dd), which is exact on a plane through the point.
-      const float middle = 0.5f * (near + std::min(far, 1.0f)) + 1e-12f;
-      density[j] = tilt * middle / (middle + (h0 + g * middle) * g);
-    }
-    if (!any) return;
-    for (int j = 0; j < kDirections; ++j) {
-      if (!(to[j] > from[j])) continue;
-      // Count what is not covered yet: surfaces may lie on each other.
-      const std::uint64_t rings = mask(to[j]) & ~mask(from[j]);
-      const std::uint64_t fresh = rings & ~covered_[j];
-      covered_[j] |= rings;
-      float share = density[j];
-      if (fresh != rings) share *= static_cast<float>(std::popcount(fresh)) / static_cast<float>(std::popcount(rings));
-      if (share == 0) continue;
-      const float start = kernel_integral<kernel>(from[j]);
-      whole_ += share * (kernel_integral<kernel>(to[j]) - start);
-      const float end = std::min(to[j], reach_[j]);
-      if (end > from[j]) sum_ += share * (kernel_integral<kernel>(end) - start);
-    }
+
+    Plane plane;
+    plane.h0 = glm::dot(normal, a) / normal.z;
+    plane.gx = -normal.x / normal.z;
+    plane.gy = -normal.y / normal.z;
+    plane.tilt = glm::length(normal) / normal.z;
+    // Directions come quadrant by quadrant: most small triangles lie in one.
+    if (high.x >= 0 && high.y >= 0) add_quadrant<0>(triangle, plane);
+    if (low.x <= 0 && high.y >= 0) add_quadrant<1>(triangle, plane);
+    if (low.x <= 0 && low.y <= 0) add_quadrant<2>(triangle, plane);
+    if (high.x >= 0 && low.y <= 0) add_quadrant<3>(triangle, plane);
   }
 
   /// Integral of the kernel over the surface that is visible, and over all of it.
@@ -132,6 +97,77 @@ class Sweep {
   float whole() const { return whole_ * (kPi / kDirections); }
 
  private:
+  static constexpr int kQuadrant = kDirections / 4;
+
+  /// Of a triangle: height over the tangent plane is h0 + gx x + gy y, area over projected area is tilt.
+  struct Plane {
+    float h0, gx, gy, tilt;
+  };
+
+  template <int quadrant>
+  void add_quadrant(const LocalTriangle& triangle, const Plane& plane) {
+    const float* const dx = kDirection.x + quadrant * kQuadrant;
+    const float* const dy = kDirection.y + quadrant * kQuadrant;
+    // Intersect the triangle with each direction: lower <= distance in the plane <= upper.
+    alignas(32) float lower[kQuadrant], upper[kQuadrant];
+    for (int j = 0; j < kQuadrant; ++j) {
+      lower[j] = 0;
+      upper[j] = 2;
+    }
+    for (int e = 0; e < 3; ++e) {
+      const Vec3& a = triangle.corner[e];
+      const Vec3& b = triangle.corner[e == 2 ? 0 : e + 1];
+      const float nx = b.y - a.y, ny = a.x - b.x;  // outwards
+      const float c = a.x * b.y - a.y * b.x;
+      const float parallel = c < 0 ? 3.0f : 0.0f;  // a direction along the edge lies on the inner side of it, or on the outer
+      for (int j = 0; j < kQuadrant; ++j) {
+        const float d = nx * dx[j] + ny * dy[j];
+        const float t = c / d;
+        const float low = d < 0 ? t : d == 0 ? parallel : 0.0f, high = d > 0 ? t : 2.0f;
+        lower[j] = low > lower[j] ? low : lower[j];
+        upper[j] = high < upper[j] ? high : upper[j];
+      }
+    }
+    // Cut off what is too steep and what is outside the ball.
+    alignas(32) float from[kQuadrant], to[kQuadrant], density[kQuadrant];
+    int any = 0;
+    for (int j = 0; j < kQuadrant; ++j) {
+      const float g = plane.gx * dx[j] + plane.gy * dy[j];
+      constexpr float kSlope = Neighbourhood::kMaxSlope;
+      float near = lower[j];
+      const float above = plane.h0 / (kSlope - g), below = -plane.h0 / (kSlope + g);
+      near = above > near ? above : near;
+      near = below > near ? below : near;
+      const float far = upper[j] > near ? upper[j] : near;
+      const float h_near = plane.h0 + g * near, h_far = plane.h0 + g * far;
+      const float q_near = near * near + h_near * h_near, q_far = far * far + h_far * h_far;
+      from[j] = q_near;
+      to[j] = q_far < 1.0f ? q_far : 1.0f;
+      any |= q_far > q_near && q_near < 1.0f ? 1 : 0;
+      // Area element over that of the kernel's distance d: rho drho / (d dd), which is exact on a plane through the point.
+      const float middle = 0.5f * (near + (far < 1.0f ? far : 1.0f)) + 1e-12f;
+      density[j] = plane.tilt * middle / (middle + (plane.h0 + g * middle) * g);
+    }
+    if (any == 0) return;
+    for (int j = 0; j < kQuadrant; ++j)
+      if (to[j] > from[j]) count(quadrant * kQuadrant + j, from[j], to[j], density[j]);
+  }
+
+  /// Counts what is not covered yet: surfaces may lie on each other.
+  void count(int direction, float from, float to, float density) {
+    const std::uint64_t rings = mask(to) & ~mask(from);
+    const std::uint64_t fresh = rings & ~covered_[direction];
+    covered_[direction] |= rings;
+    if (fresh != rings) {
+      if (fresh == 0) return;
+      density *= static_cast<float>(std::popcount(fresh)) / static_cast<float>(std::popcount(rings));
+    }
+    const float start = kernel_integral<kernel>(from);
+    whole_ += density * (kernel_integral<kernel>(to) - start);
+    const float end = std::min(to, reach_[direction]);
+    if (end > from) sum_ += density * (kernel_integral<kernel>(end) - start);
+  }
+
   /// The rings within the squared distance q.
   static std::uint64_t mask(float q) {
     const int rings = static_cast<int>(q * kRings + 0.5f);

@@ -93,7 +93,7 @@ def compile_network(source: SourceFile, library: Library, dump: Dump | None = No
     _dump_text(dump, "parse", file)
     expanded = expand_macros(file, set(library.operators), _read_used, reporter)
     file = expanded.file
-    network = resolve(file, _default_name(source.name), library, reporter, expanded.broken)
+    network = resolve(file, _default_name(source.name), library, reporter, expanded.broken | file.broken)
 
     def result(typed: TypedNetwork | None, found: dict[str, tuple[str, ...]], plan: Schedule | None) -> Result:
         return Result(file, typed, found, plan, _with_calls(reporter.sorted(), expanded.calls))
@@ -130,7 +130,7 @@ def compile_file(path: str, ops: tuple[str, ...] = (), dump: Dump | None = None)
     source = read_source(path)
     library, faults = load_library(ops)
     if faults:
-        return Result(ast.File((), (), faults[0].span), None, {}, None, faults)
+        return Result(ast.File((), (), frozenset(), faults[0].span), None, {}, None, faults)
     return compile_network(source, library, dump)
 
 

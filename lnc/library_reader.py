@@ -103,7 +103,7 @@ class _OperatorReader:
         rules = [
             rule for i in body if isinstance(i, ast.PathsDeclaration) for rule in self._rules(i, ports, parameters)
         ]
-        if not rules:
+        if not any(isinstance(i, ast.PathsDeclaration) for i in body):
             self._error(declaration.name_span, f"'{declaration.name}' does not declare its light paths")
         return Operator(
             name=declaration.name,
@@ -185,6 +185,7 @@ class _OperatorReader:
                 rules.append(PathRule(item.content, None, head.tag.name if head.tag else None, tail))
             else:
                 self._error(path.span, "light paths begin with a port or with L")
+                continue
             self._check_tail(tail, parameters)
         return rules
 

@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from lnc.library import Library
+from lnc.library_reader import load_library
+
 ROOT = Path(__file__).resolve().parent.parent
 SCENES = ROOT / "examples" / "scenes"
 
@@ -25,6 +28,23 @@ class Run:
     stderr: str
     picture: Path
     stats: dict
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--update-golden", action="store_true", help="write what was found into the cases")
+
+
+@pytest.fixture(scope="session")
+def update_golden(pytestconfig: pytest.Config) -> bool:
+    return bool(pytestconfig.getoption("--update-golden"))
+
+
+@pytest.fixture(scope="session")
+def library() -> Library:
+    """The built-in operators."""
+    found, faults = load_library()
+    assert not faults, faults
+    return found
 
 
 @pytest.fixture(scope="session")

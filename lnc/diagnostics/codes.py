@@ -136,8 +136,8 @@ as a call.""",
         """A `via` begins with an event that the light at the port cannot be scattered by. Irradiance has no
 directions, so a surface can scatter it by D alone. Samples come from directions of their own
 choice: D and G, for S asks for one exact direction. Radiance can be scattered by all.""",
-        """light = Lights() photons = ParticleTracer(light) soft = NNDensity(photons) image PathTracer(soft,
-via = S) """,
+        "light   = Lights()\nphotons = ParticleTracer(light)\nsoft    = NNDensity(photons)\n"
+        "image   PathTracer(soft, via = S)\n",
     ),
     Page(
         "LN0401",

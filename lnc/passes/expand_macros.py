@@ -43,7 +43,7 @@ def expand_macros(file: ast.File, operators: set[str], read: Read, reporter: Rep
         return Expanded(file)
     macros = _Macros(operators, read, reporter)
     macros.collect(file)
-    return _Expander(macros.found, reporter).run(file)
+    return _Expander(macros.found, file.broken | macros.broken, reporter).run(file)
 
 
 class _Macros:
@@ -55,6 +55,7 @@ class _Macros:
         self.reporter = reporter
         self.found: dict[str, ast.Macro] = {}
         self.files: set[str] = set()
+        self.broken: set[str] = set()
 
     def collect(self, file: ast.File) -> None:
         queue = [file]
@@ -82,7 +83,9 @@ class _Macros:
         if len(self.files) > FILE_LIMIT:
             self.reporter.error("LN0111", use.span, f"more than {FILE_LIMIT} files are used")
             return None
-        return parse(source, self.reporter)
+        file = parse(source, self.reporter)
+        self.broken |= file.broken
+        return file
 
     def _add(self, macro: ast.Macro) -> None:
         if macro.name in self.found or macro.name in self.operators:
@@ -113,12 +116,12 @@ class _Instance:
 
 
 class _Expander:
-    def __init__(self, macros: dict[str, ast.Macro], reporter: Reporter) -> None:
+    def __init__(self, macros: dict[str, ast.Macro], broken: frozenset[str], reporter: Reporter) -> None:
         self.macros = macros
         self.reporter = reporter
         self.names = Names(())
         self.calls: dict[Span, Span] = {}
-        self.broken: set[str] = set()
+        self.broken = set(broken)
         self.pending: list[tuple[ast.Equation, _Instance]] = []
         self.count = 0
 
@@ -181,7 +184,9 @@ class _Expander:
         known = list(instance.wires)
         message = f"no wire is called {quote(name)} in the macro {quote(instance.macro.name)}"
         help = did_you_mean(name, known) or "a macro sees its own inputs and equations only"
-        self.reporter.error("LN0102", wire.span, message, help=help)
+        if name not in self.broken:
+            self.reporter.error("LN0102", wire.span, message, help=help)
+        self.broken.add(name)
         return wire
 
     def _arguments(self, arguments: tuple[ast.Argument, ...], instance: _Instance) -> tuple[ast.Argument, ...]:

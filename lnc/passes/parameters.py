@@ -29,15 +29,22 @@ WANTED = {
 
 
 def parameter_value(
-    parameter: Parameter, value: ast.Value | None, tags: Collection[str], reporter: Reporter
+    parameter: Parameter,
+    value: ast.Value | None,
+    tags: Collection[str],
+    reporter: Reporter,
+    broken: frozenset[str] = frozenset(),
 ) -> ParameterValue | None:
-    """The parameter with `value`, or with its default where that is None; None if it is wrong and reported."""
+    """The parameter with `value`, or with its default where that is None; None if it is wrong and reported.
+
+    Tags in `broken` have been reported where they are defined.
+    """
     if value is None:
         if parameter.type == "path" and parameter.default is not None:
             return ParameterValue(parameter, _path_value(parameter.default), None)  # type: ignore[arg-type]
         return ParameterValue(parameter, parameter.default, None)  # type: ignore[arg-type]
     try:
-        return ParameterValue(parameter, _convert(parameter, value, tags, reporter), value)
+        return ParameterValue(parameter, _convert(parameter, value, tags, reporter, broken), value)
     except ValueFault as fault:
         if str(fault):
             help = did_you_mean(value.name, parameter.choices) if isinstance(value, ast.NameValue) else None
@@ -45,7 +52,9 @@ def parameter_value(
         return None
 
 
-def _convert(parameter: Parameter, value: ast.Value, tags: Collection[str], reporter: Reporter) -> Scalar | PathValue:
+def _convert(
+    parameter: Parameter, value: ast.Value, tags: Collection[str], reporter: Reporter, broken: frozenset[str]
+) -> Scalar | PathValue:
     match parameter.type, value:
         case kind, ast.NumberValue(text) if kind in UNITS:
             return _in_range(parameter, number(text, kind), text)
@@ -60,13 +69,15 @@ def _convert(parameter: Parameter, value: ast.Value, tags: Collection[str], repo
         case "tags", ast.NameValue(name):
             if name not in tags:
                 help = did_you_mean(name, tags) or f'define it: tag {name} = material "..."'
+                if name in broken:
+                    raise ValueFault("")
                 reporter.error("LN0102", value.span, f"no tag is called {quote(name)}", help=help)
                 raise ValueFault("")
             return name
         case "path", ast.NameValue(name):
-            return _path(parameter, _letters_or_tag(name, value.span), tags, reporter)
+            return _path(parameter, _letters_or_tag(name, value.span), tags, reporter, broken)
         case "path", ast.PathLiteral(path):
-            return _path(parameter, path, tags, reporter)
+            return _path(parameter, path, tags, reporter, broken)
     wanted = f"one of {', '.join(parameter.choices)}" if parameter.type == "choice" else WANTED[parameter.type]
     raise ValueFault(f"{wanted} is wanted, not {quote(value.span.text)}")
 
@@ -95,11 +106,19 @@ def _letters_or_tag(name: str, span: Span) -> ast.PathExpression:
     return ast.PathName(name, None, span)
 
 
-def _path(parameter: Parameter, path: ast.PathExpression, tags: Collection[str], reporter: Reporter) -> PathValue:
+def _path(
+    parameter: Parameter,
+    path: ast.PathExpression,
+    tags: Collection[str],
+    reporter: Reporter,
+    broken: frozenset[str],
+) -> PathValue:
     used = tags_in(path)
     unknown = sorted(used - set(tags))
     if unknown:
         help = did_you_mean(unknown[0], tags)
+        if unknown[0] in broken:
+            raise ValueFault("")
         reporter.error("LN0102", path.span, f"no tag is called {quote(unknown[0])}", help=help)
         raise ValueFault("")
     if len(used) > TAG_LIMIT:

@@ -237,6 +237,8 @@ class _Resolver:
             self._add(name, op, inputs, parameters, origin, home, call.span, annotation)
 
     def _unknown_operator(self, call: ast.Call) -> None:
+        if call.op in self.broken:
+            return
         message = f"no operator is called {quote(call.op)}"
         help = did_you_mean(call.op, self.library.operators)
         if call.op in self.equations:
@@ -332,7 +334,7 @@ class _Resolver:
             message = f"'{call.op}' needs its parameter '{parameter.name}: {parameter.type}'"
             self.reporter.error("LN0105", call.span, message)
             return None
-        return parameter_value(parameter, argument.value if argument else None, self.tags, self.reporter)
+        return parameter_value(parameter, argument.value if argument else None, self.tags, self.reporter, self.broken)
 
     # --- Conversions that are asked for -------------------------------------------------------------------------------
 
@@ -425,7 +427,7 @@ class _Resolver:
         self.reporter.error("LN0102", span, f"no representation is called {quote(name)}", help=help)
 
     def _check_tags(self, path: ast.PathExpression) -> None:
-        for name in sorted(tags_in(path) - set(self.tags)):
+        for name in sorted(tags_in(path) - set(self.tags) - self.broken):
             help = did_you_mean(name, self.tags)
             self.reporter.error("LN0102", path.span, f"no tag is called {quote(name)}", help=help)
 

@@ -370,4 +370,5 @@ Statement = (
 class File(Record):
     statements: tuple[Statement, ...]
     end_comments: tuple[str, ...]  # after the last statement
+    broken: frozenset[str]  # names that statements with a mistake would have defined
     span: Span

@@ -74,7 +74,7 @@ class Builder:
         lines = _without_last_blank(lines)
         if blank and lines:
             lines.insert(0, "")
-        return ast.File(tuple(children), tuple(lines), span)
+        return ast.File(tuple(children), tuple(lines), frozenset(self.tokens.broken), span)
 
     def name(self, span: Span, children: Children) -> Token:
         return children[0]  # type: ignore[no-any-return]

@@ -13,7 +13,7 @@ from lnc.source import SourceFile, Span
 from lnc.syntax.ast import File
 from lnc.syntax.build import Builder
 from lnc.syntax.tables import Tables, load_tables
-from lnc.syntax.tokens import END, NEWLINE, Token, Tokens, tokenise
+from lnc.syntax.tokens import END, NEWLINE, Token, Tokens, defined_name, tokenise
 
 STATEMENT_WORDS = (
     "network",
@@ -59,6 +59,7 @@ class _Parser:
         self.source = source
         self.tables = tables
         self.tokens = tokens.items
+        self.broken = tokens.broken
         self.reporter = reporter
         self.builder = Builder(source, tokens, reporter)
         self.stack = _Stack(tables.start)
@@ -78,6 +79,7 @@ class _Parser:
                     saved, saved_at = self.stack.copy(), at
                 continue
             self._report(at, saved_at)
+            self.broken.add(defined_name(self.tokens[saved_at : saved_at + 2]) or "")
             self.stack = saved.copy()
             at, braces = self._skip(saved_at, at, braces)
             if self.tokens[at].type == END and not self._accepts(END):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from lnc.diagnostics import Reporter
@@ -42,6 +42,7 @@ class Tokens:
         self.source = source
         self.items = items
         self.comments = comments
+        self.broken: set[str] = set()  # names that statements with a mistake would have defined
         self._comment_starts = [c.start for c in comments]
         code = [token for token in items if token.type != NEWLINE]
         self._starts = [token.start for token in code]
@@ -108,10 +109,23 @@ def tokenise(source: SourceFile, tables: Tables, reporter: Reporter) -> Tokens:
         elif token.text in (")", "]") and index not in open_forever:
             depth -= 1
         items.append(token)
-    items = _drop_statements(items, bad)
-    items = _check_nesting(source, items, reporter)
+    broken: set[str] = set()
+    items = _drop_statements(items, bad, broken)
+    items = _check_nesting(source, items, broken, reporter)
     items.append(Token(END, "", len(source.text), len(source.text)))
-    return Tokens(source, items, comments)
+    tokens = Tokens(source, items, comments)
+    tokens.broken = broken
+    return tokens
+
+
+def defined_name(statement: Sequence[Token]) -> str | None:
+    """The name that a statement defines, as far as its first words tell: `name =`, `tag name`, `op name`."""
+    if len(statement) < 2:
+        return None
+    first, second = statement[:2]
+    if second.text in ("=", ":"):
+        return first.text
+    return second.text if first.text in ("tag", "op") else None
 
 
 def _scan(source: SourceFile, tables: Tables, reporter: Reporter) -> tuple[list[Token], list[Comment], list[int]]:
@@ -174,7 +188,7 @@ def _unmatched(raw: list[Token]) -> set[int]:
     return unmatched | set(stack)
 
 
-def _drop_statements(items: list[Token], bad: list[int]) -> list[Token]:
+def _drop_statements(items: list[Token], bad: list[int], broken: set[str]) -> list[Token]:
     """Leave out the statements in which a fault was reported: one mistake, one message.
 
     With the head of a block goes the whole block; a brace that closes an outer block stays.
@@ -191,6 +205,7 @@ def _drop_statements(items: list[Token], bad: list[int]) -> list[Token]:
             continue
         faulty = bisect_left(bad, start) != bisect_left(bad, token.start)
         if faulty or dropping:
+            broken.add(defined_name(statement) or "")
             dropping += sum((t.text == "{") - (t.text == "}") for t in statement)
             if dropping < 0:
                 kept.append(next(t for t in reversed(statement) if t.text == "}"))
@@ -204,7 +219,7 @@ def _drop_statements(items: list[Token], bad: list[int]) -> list[Token]:
     return kept
 
 
-def _check_nesting(source: SourceFile, items: list[Token], reporter: Reporter) -> list[Token]:
+def _check_nesting(source: SourceFile, items: list[Token], broken: set[str], reporter: Reporter) -> list[Token]:
     """Cut the statements that nest too deeply for the passes, which walk expressions by recursion."""
     depth = 0
     bad: list[int] = []
@@ -219,4 +234,4 @@ def _check_nesting(source: SourceFile, items: list[Token], reporter: Reporter) -
             depth -= 1
         elif token.type == NEWLINE:
             depth = 0
-    return _drop_statements(items, bad)
+    return _drop_statements(items, bad, broken)

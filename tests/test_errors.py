@@ -1,0 +1,82 @@
+"""One tiny wrong network per file in `tests/errors`, the expected message as a comment on the offending line.
+
+    direct = Direct(light, sampels = 4)  // error: LN0103: 'Direct' has no parameter 'sampels'
+
+Every message must be expected: one mistake, one message. A folder of the same name holds further operators.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from lnc.diagnostics.codes import PAGES
+from lnc.diagnostics.format import human
+from lnc.driver import compile_file, compile_network
+from lnc.library import Library
+from lnc.library_reader import read_library
+from lnc.source import SourceFile
+
+ERRORS = Path(__file__).parent / "errors"
+EXPECTED = re.compile(r"// (error|warning): (LN\d{4}): (.*?) *$")
+
+
+@pytest.mark.parametrize("path", sorted(ERRORS.glob("*.ln")), ids=lambda p: p.stem)
+def test_error(path: Path) -> None:
+    expected = [
+        (line, *match.groups())
+        for line, text in enumerate(path.read_text("utf-8").splitlines(), 1)
+        if (match := EXPECTED.search(text))
+    ]
+    folder = path.with_suffix("")
+    result = compile_file(str(path), (str(folder),) if folder.is_dir() else ())
+    found = [(d.span.line, d.severity, d.code, d.message) for d in result.diagnostics]
+    assert found == expected
+    assert path.name.startswith(tuple(d.code for d in result.diagnostics))
+
+
+@pytest.mark.parametrize("code", sorted(PAGES))
+def test_every_page_has_an_example_that_provokes_it(code: str, library: Library) -> None:
+    page = PAGES[code]
+    assert page.code == code and page.text.strip() and page.title
+    if page.example is None:
+        return
+    result = compile_network(SourceFile("example.ln", page.example), library)
+    assert [d.code for d in result.diagnostics] == [code]
+
+
+def test_every_code_is_provoked_by_a_file() -> None:
+    provoked = {path.stem[:6] for path in ERRORS.glob("*.ln")}
+    assert set(PAGES) - provoked == {"LN0100", "LN0112"}  # an unreadable file; test_library.py
+
+
+def test_every_code_in_the_compiler_has_a_page() -> None:
+    sources = Path(__file__).parent.parent / "lnc"
+    used = {code for path in sources.rglob("*.py") for code in re.findall(r'"(LN\d{4})"', path.read_text("utf-8"))}
+    assert used == set(PAGES)
+
+
+def test_wrong_declarations() -> None:
+    texts = {
+        "/ops/a/wrong_name/other.ln": "representation Points\noperator Wrong() -> Points {\npaths radiance = L\n}\n",
+        "/ops/a/bad/bad.ln": "operator Bad(in: Nothing) -> Points {\nn: count = 1%\nm: thing\n}\n",
+        "/ops/a/paths/paths.ln": "operator Paths(in: Points) -> Points {\npaths light = in\npaths samples = D in\n}\n",
+    }
+    _, faults = read_library(texts)
+    assert {d.code for d in faults} == {"LN0112"}
+    assert len(faults) == 7
+
+
+def test_carets_stand_under_the_text() -> None:
+    source = SourceFile("a\x1b[31m.ln", "\tlight = Lights(form = x)\n")
+    from lnc.library_reader import load_library
+
+    (diagnostic,) = compile_network(source, load_library()[0]).diagnostics
+    lines = human(diagnostic).split("\n")
+    assert lines[0] == "error[LN0103]: 'Lights' has no parameter 'form'"
+    assert lines[1] == r"  --> a\x1b[31m.ln:1:17"
+    assert lines[4].index("^") == lines[3].index("form")
+    assert lines[4].count("^") == len("form")
+    assert lines[5] == "help: did you mean 'from'?"

@@ -1,6 +1,7 @@
 #include "ln/photon_map.hpp"
 
 #include <algorithm>
+#include <bit>
 
 namespace ln {
 
@@ -9,7 +10,28 @@ namespace {
 /// Where the missing photons of the last block are: beyond any query, and squared still a float.
 constexpr float kNowhere = 1e15f;
 
-/// Photons a task of the parallel build should have.
+/// A block's worth of values, in one register where the processor has such.
+using Lanes = float __attribute__((vector_size(4 * PhotonMap::kBlock)));
+using LaneMask = std::int32_t __attribute__((vector_size(4 * PhotonMap::kBlock)));
+
+inline Lanes load(const float* values) {
+  Lanes lanes;
+  __builtin_memcpy(&lanes, values, sizeof lanes);
+  return lanes;
+}
+
+/// Bit i: is lane i of the mask set?
+inline unsigned lane_bits(const LaneMask& mask) {
+#if defined(__AVX__)
+  return static_cast<unsigned>(__builtin_ia32_movmskps256(__builtin_bit_cast(Lanes, mask)));
+#else
+  unsigned bits = 0;
+  for (unsigned i = 0; i < PhotonMap::kBlock; ++i) bits |= static_cast<unsigned>(mask[i] & 1) << i;
+  return bits;
+#endif
+}
+
+/// Blocks that a task of the parallel build should have.
 constexpr std::size_t kTaskBlocks = 1024;
 
 }  // namespace
@@ -154,21 +176,15 @@ std::size_t PhotonMap::nearest(const Neighbourhood& around, float max_distance2,
     }
 
     const Block& block = blocks_[range.begin];
-    float distance2[kBlock];
-    bool near[kBlock];
-    bool any_near = false;
-    for (std::uint32_t i = 0; i < kBlock; ++i) {
-      const float x = block.x[i] - p.x, y = block.y[i] - p.y, z = block.z[i] - p.z;
-      const float height = x * n.x + y * n.y + z * n.z;
-      distance2[i] = x * x + y * y + z * z;
-      // height <= slope * distance in the plane, but for rounding
-      constexpr float kSlope2 = Neighbourhood::kMaxSlope * Neighbourhood::kMaxSlope;
-      near[i] = (distance2[i] < limit) & (height * height * (1 + kSlope2) <= kSlope2 * distance2[i] + 1e-12f);
-      any_near |= near[i];
+    const Lanes x = load(block.x) - p.x, y = load(block.y) - p.y, z = load(block.z) - p.z;
+    const Lanes height = x * n.x + y * n.y + z * n.z, distance2 = x * x + y * y + z * z;
+    // height <= slope * distance in the plane, but for rounding
+    constexpr float kSlope2 = Neighbourhood::kMaxSlope * Neighbourhood::kMaxSlope;
+    unsigned near = lane_bits((distance2 < limit) & (height * height * (1 + kSlope2) <= kSlope2 * distance2 + 1e-12f));
+    for (; near != 0; near &= near - 1) {
+      const auto i = static_cast<std::uint32_t>(std::countr_zero(near));
+      if (agrees(block.normal[i])) found[count++] = {distance2[i], range.begin * kBlock + i};
     }
-    if (!any_near) continue;
-    for (std::uint32_t i = 0; i < kBlock; ++i)
-      if (near[i] && agrees(block.normal[i])) found[count++] = {distance2[i], range.begin * kBlock + i};
     if (count > 2 * wanted) keep_nearest();  // the next block has room again
   }
   if (count >= wanted) keep_nearest();

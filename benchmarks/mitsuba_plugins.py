@@ -38,7 +38,7 @@ def register() -> None:
             self.m_components = [mi.BSDFFlags.DeltaReflection | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide]
             self.m_flags = self.m_components[0]
 
-        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             cosine = mi.Frame3f.cos_theta(si.wi)
             active &= cosine != 0
             bs = mi.BSDFSample3f()
@@ -49,13 +49,13 @@ def register() -> None:
             bs.sampled_component = mi.UInt32(0)
             return bs, schlick(self.f0, 1.0, dr.abs(cosine)) & active
 
-        def eval(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return mi.Color3f(0.0)
 
-        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return mi.Float(0.0)
 
-        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return mi.Color3f(0.0), mi.Float(0.0)
 
         def to_string(self) -> str:
@@ -112,7 +112,7 @@ def register() -> None:
         def distribution(self) -> Any:
             return mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self.alpha, True)
 
-        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             side = flip_sign(si.wi)
             wi = mi.Vector3f(si.wi.x, si.wi.y, si.wi.z * side)
             cosine = sample1 < self.cosine_share
@@ -127,7 +127,7 @@ def register() -> None:
             kinds = mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection
             bs.sampled_type = dr.select(cosine, mi.UInt32(+kinds[0]), mi.UInt32(+kinds[1]))
             bs.sampled_component = dr.select(cosine, mi.UInt32(1), mi.UInt32(0))
-            return bs, dr.select(active, value / pdf, 0.0)
+            return bs, dr.select(active, value / dr.maximum(pdf, 1e-20), 0.0)
 
         def evaluate(self, wi: Any, wo: Any) -> Any:
             """The BSDF times the cosine, and the pdf, for directions on the upper side."""
@@ -149,17 +149,17 @@ def register() -> None:
             pdf = self.cosine_share * wo.z * dr.inv_pi + (1 - self.cosine_share) * glossy_pdf
             return value, dr.select(valid, pdf, 0.0)
 
-        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             side = flip_sign(si.wi)
             value, pdf = self.evaluate(
                 mi.Vector3f(si.wi.x, si.wi.y, si.wi.z * side), mi.Vector3f(wo.x, wo.y, wo.z * side)
             )
             return dr.select(active, value, 0.0), dr.select(active, pdf, 0.0)
 
-        def eval(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return self.eval_pdf(ctx, si, wo, active)[0]
 
-        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any) -> Any:
+        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return self.eval_pdf(ctx, si, wo, active)[1]
 
         def to_string(self) -> str:
@@ -186,7 +186,7 @@ def register() -> None:
             ds.time = it.time
             ds.pdf = 1.0
             ds.delta = mi.Bool(True)
-            ds.emitter = mi.EmitterPtr(self)
+            ds.emitter = mi.EmitterPtr(self) if is_vectorized else self
             ds.d = ds.p - it.p
             squared = dr.squared_norm(ds.d)
             ds.dist = dr.sqrt(squared)

@@ -1,8 +1,6 @@
 #include "ln/emitters.hpp"
 
-#if __has_include("ln/texture.hpp")
 #include "ln/material.hpp"
-#endif
 
 namespace ln {
 
@@ -100,6 +98,12 @@ Emitters::Emitters(const SceneData& scene, const Image* environment, const Emitt
 }
 
 void Emitters::add_surfaces(const EmitterSelection& selection) {
+  // Texture look-ups to spend on a triangle, along each side.
+  double varying = 1;
+  for (const Part& part : scene_->parts)
+    if (emission_varies(part, scene_->materials[part.material])) varying += part.triangle_count;
+  const int samples = std::clamp(static_cast<int>(std::sqrt(4e6 / varying)), 4, 64);
+
   for (std::size_t p = 0; p < scene_->parts.size(); ++p) {
     const Part& part = scene_->parts[p];
     const Material& material = scene_->materials[part.material];
@@ -124,7 +128,7 @@ void Emitters::add_surfaces(const EmitterSelection& selection) {
       if (light.size == 0) continue;
       light.double_sided = material.double_sided;
       light.varies = surface.varies;
-      light.radiance = surface.varies ? mean_radiance(triangle) : material.emission;
+      light.radiance = surface.varies ? mean_radiance(triangle, samples) : material.emission;
       if (is_black(light.radiance)) continue;
       const auto index = static_cast<std::uint32_t>(area_.size());
       light_of_triangle_[surface.first_slot + k] = index;
@@ -214,7 +218,7 @@ Emitters::Choice Emitters::choose(const Vec3& p, const Vec3& n) const {
   Choice choice;
   if (finite_count() > 0) {
     choice.root = tree_.root(p, n);
-    choice.finite = choice.root.total;
+    choice.finite = choice.root.total();
   }
   if (distant_.empty() && !environment_) {
     choice.finite = choice.finite > 0 ? 1.0f : 0.0f;
@@ -357,7 +361,6 @@ Color Emitters::surface_radiance(const Surface& surface, const Hit& hit, const V
   return surface.varies ? varying_radiance(hit.triangle, hit.u, hit.v) : surface.radiance;
 }
 
-#if __has_include("ln/texture.hpp")
 Color Emitters::varying_radiance(std::uint32_t triangle, float u, float v) const {
   const Part& part = scene_->parts[scene_->triangle_part[triangle]];
   const Material& material = scene_->materials[part.material];
@@ -371,19 +374,14 @@ Color Emitters::varying_radiance(std::uint32_t triangle, float u, float v) const
   }
   return glm::max(radiance, Color(0));
 }
-#else
-Color Emitters::varying_radiance(std::uint32_t triangle, float, float) const {
-  return scene_->materials[scene_->parts[scene_->triangle_part[triangle]].material].emission;
-}
-#endif
 
-Color Emitters::mean_radiance(std::uint32_t triangle) const {
+Color Emitters::mean_radiance(std::uint32_t triangle, int most_samples) const {
   const Part& part = scene_->parts[scene_->triangle_part[triangle]];
   const Material& material = scene_->materials[part.material];
 
   // As many samples a side as the triangle covers texels, within reason.
   const TextureRef& ref = material.unlit ? material.base_color_texture : material.emissive_texture;
-  int n = 4;
+  float texels = 0;
   if (ref && !scene_->uvs[ref.uv_set].empty()) {
     const auto& uvs = scene_->uvs[ref.uv_set];
     const UVec3 i = scene_->triangles[triangle];
@@ -394,9 +392,9 @@ Color Emitters::mean_radiance(std::uint32_t triangle) const {
     };
     const Vec2 a = texel(i.x), b = texel(i.y), c = texel(i.z);
     const Vec2 extent = glm::max(a, glm::max(b, c)) - glm::min(a, glm::min(b, c));
-    const float texels = std::max(extent.x, extent.y);
-    n = texels < 64 ? std::max(4, static_cast<int>(texels) + 2) : 64;
+    texels = std::max(extent.x, extent.y);
   }
+  const int n = texels < static_cast<float>(most_samples) ? std::max(4, static_cast<int>(texels) + 1) : most_samples;
   glm::dvec3 sum(0);
   for (int y = 0; y < n; ++y) {
     for (int x = 0; x < n; ++x) {

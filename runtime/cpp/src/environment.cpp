@@ -1,5 +1,7 @@
 #include "ln/emitter_environment.hpp"
 
+#include "ln/texture.hpp"
+
 namespace ln {
 
 namespace {
@@ -7,11 +9,6 @@ namespace {
 constexpr double kPiDouble = 3.14159265358979323846;
 
 float usable(float x) { return x > 0 && x < kInfinity ? x : 0.0f; }
-
-float srgb_to_linear(std::uint8_t byte) {
-  const float x = static_cast<float>(byte) * (1.0f / 255.0f);
-  return x <= 0.04045f ? x / 12.92f : std::pow((x + 0.055f) / 1.055f, 2.4f);
-}
 
 /// Integral over [a, b] of (p + q theta) sin(theta).
 double integrate_linear_sin(double a, double b, double p, double q) {
@@ -40,10 +37,10 @@ Environment::Environment(const Image& image) : image_(&image) {
     constant_ = true;
     return;
   }
-  mean_ = texel(0, 0);
+  mean_ = light_of(0, 0);
   constant_ = true;
   for (int y = 0; y < height && constant_; ++y)
-    for (int x = 0; x < width && constant_; ++x) constant_ = texel(x, y) == mean_;
+    for (int x = 0; x < width && constant_; ++x) constant_ = light_of(x, y) == mean_;
   if (constant_) return;
 
   // Integrate the interpolated picture over its pixels.
@@ -52,7 +49,7 @@ Environment::Environment(const Image& image) : image_(&image) {
   std::vector<double> ring[3], cells(width), rows(height);
   std::vector<Color> row(width);
   const auto load = [&](int y) {
-    for (int x = 0; x < width; ++x) row[x] = texel(x, y);
+    for (int x = 0; x < width; ++x) row[x] = light_of(x, y);
     const RowWeights up = row_weights(std::max(y - 1, 0), step), own = row_weights(y, step), down = row_weights(std::min(y + 1, height - 1), step);
     const double share = own.own + (y > 0 ? up.below : own.above) + (y < height - 1 ? down.above : own.below);
     ring[y % 3].resize(width);
@@ -77,14 +74,9 @@ Environment::Environment(const Image& image) : image_(&image) {
   mean_ = Color(sum / (2.0 * width));
 }
 
-Color Environment::texel(int x, int y) const {
-  const Image& image = *image_;
-  const std::size_t at = (static_cast<std::size_t>(y) * image.width + x) * image.channels;
-  const int g = image.channels >= 3 ? 1 : 0, b = image.channels >= 3 ? 2 : 0;
-  if (!image.floats.empty()) return {usable(image.floats[at]), usable(image.floats[at + g]), usable(image.floats[at + b])};
-  const std::uint8_t* bytes = &image.bytes[at];
-  if (image.srgb) return {srgb_to_linear(bytes[0]), srgb_to_linear(bytes[g]), srgb_to_linear(bytes[b])};
-  return Color(bytes[0], bytes[g], bytes[b]) * (1.0f / 255.0f);
+Color Environment::light_of(int x, int y) const {
+  const Vec4 t = texel(*image_, x, y);
+  return {usable(t.x), usable(t.y), usable(t.z)};
 }
 
 Vec2 Environment::picture_position(const Vec3& w) const {
@@ -101,7 +93,7 @@ Color Environment::interpolated(const Vec3& w) const {
   if (x0 >= width) x0 -= width;
   if (x1 >= width) x1 -= width;
   const int y0 = std::clamp(static_cast<int>(y), 0, height - 1), y1 = std::clamp(static_cast<int>(y) + 1, 0, height - 1);
-  const Color top = (1 - fx) * texel(x0, y0) + fx * texel(x1, y0), bottom = (1 - fx) * texel(x0, y1) + fx * texel(x1, y1);
+  const Color top = (1 - fx) * light_of(x0, y0) + fx * light_of(x1, y0), bottom = (1 - fx) * light_of(x0, y1) + fx * light_of(x1, y1);
   return (1 - fy) * top + fy * bottom;
 }
 

@@ -127,7 +127,8 @@ class Builder {
  private:
   /// Where to divide a range in two: the cheapest of the bounds between bins along the three axes; reorders the range.
   std::uint32_t split(std::uint32_t begin, std::uint32_t end) {
-    constexpr int kBins = 12;
+    constexpr int kMostBins = 12;
+    const int bins_used = end - begin < 64 ? 6 : kMostBins;
     const std::uint32_t half = (begin + end) / 2;
     if (end - begin == 2) return half;
     Box centers, box;
@@ -142,17 +143,17 @@ class Builder {
     for (int axis = 0; axis < 3; ++axis) {
       const float low = centers.low[axis], width = centers.high[axis] - low;
       if (!(width > 0)) continue;
-      Summary bins[kBins];
-      for (std::uint32_t i = begin; i < end; ++i) bins[bin(order_[i], axis, low, width, kBins)].add(summaries_[order_[i]]);
+      Summary bins[kMostBins];
+      for (std::uint32_t i = begin; i < end; ++i) bins[bin(order_[i], axis, low, width, bins_used)].add(summaries_[order_[i]]);
       // Charge thin slices for being long in the other directions.
       const double regularity = longest / std::max(extent[axis], longest * 1e-6f);
-      Summary upper[kBins];
-      for (int b = kBins - 1; b > 0; --b) {
-        upper[b] = b + 1 < kBins ? upper[b + 1] : Summary{};
+      Summary upper[kMostBins];
+      for (int b = bins_used - 1; b > 0; --b) {
+        upper[b] = b + 1 < bins_used ? upper[b + 1] : Summary{};
         upper[b].add(bins[b]);
       }
       Summary lower;
-      for (int b = 0; b + 1 < kBins; ++b) {
+      for (int b = 0; b + 1 < bins_used; ++b) {
         lower.add(bins[b]);
         if (lower.count == 0 || upper[b + 1].count == 0) continue;
         const double cost = regularity * (lower.cost() + upper[b + 1].cost());
@@ -162,7 +163,7 @@ class Builder {
     if (best_axis < 0) return half;
     const float low = centers.low[best_axis], width = centers.high[best_axis] - low;
     const auto middle = std::stable_partition(order_.begin() + begin, order_.begin() + end,
-                                              [&](std::uint32_t i) { return bin(i, best_axis, low, width, kBins) <= best_bin; });
+                                              [&](std::uint32_t i) { return bin(i, best_axis, low, width, bins_used) <= best_bin; });
     return static_cast<std::uint32_t>(middle - order_.begin());
   }
 
@@ -201,7 +202,8 @@ LightBvh::LightBvh(const std::vector<LightBounds>& lights) {
       const LightBounds b = builder.bounds(begin, end);
       node.cx[k] = b.center.x, node.cy[k] = b.center.y, node.cz[k] = b.center.z;
       // Allow for rounding in the positions: normalised coordinates are at most 1.
-      node.r2[k] = sqr(b.radius * (1 + 0x1p-18f) + 0x1p-22f);
+      node.r[k] = b.radius * (1 + 0x1p-18f) + 0x1p-22f;
+      node.inv_r2[k] = 1 / sqr(node.r[k]);
       node.ax[k] = b.axis.x, node.ay[k] = b.axis.y, node.az[k] = b.axis.z;
       node.cos_o[k] = b.cos_o, node.sin_o[k] = safe_sqrt(1 - b.cos_o * b.cos_o), node.cos_e[k] = b.cos_e;
       node.phi[k] = static_cast<float>(std::max(b.phi / scale_, 1e-30));
@@ -221,65 +223,85 @@ LightBvh::LightBvh(const std::vector<LightBounds>& lights) {
   }
 }
 
+inline void LightBvh::square_root(Float8& x) {
+  for (int k = 0; k < kWidth; ++k) x[k] = std::sqrt(x[k]);
+}
+
 LightBvh::Lanes LightBvh::lanes(const Node& node, const Vec3& p, const Vec3& n) {
   // Directions that may contribute a little are not excluded because of rounding; facing factors have a floor.
   constexpr float kSlack = 1e-4f, kFloor = 1e-3f;
-  const float any_side = n == Vec3(0) ? 1.0f : 0.0f;
-  Lanes result;
-  for (int k = 0; k < kWidth; ++k) {
-    const float x = p.x - node.cx[k], y = p.y - node.cy[k], z = p.z - node.cz[k];
-    const float d2 = std::max(x * x + y * y + z * z, 1e-30f), r2 = node.r2[k];
-    const float inv_d = 1 / std::sqrt(d2);
-    // The lights are seen within theta_b; from within their sphere, in any direction.
-    const bool inside = d2 <= r2;
-    const float sin_b2 = std::min(r2 / d2, 1.0f), sin_b = std::sqrt(sin_b2), cos_b = std::sqrt(1 - sin_b2);
+  const Float8 zero{}, one = zero + 1.0f;
 
-    // Smallest angle at which any of them may emit towards p: theta_w - theta_o - theta_b.
-    const float along = (node.ax[k] * x + node.ay[k] * y + node.az[k] * z) * inv_d;
-    const float cos_w = std::min(std::max(along, -along * node.two_sided[k]), 1.0f);
-    const float sin_w = std::sqrt(std::max(1 - cos_w * cos_w, 0.0f));
-    const float cos_o = node.cos_o[k], sin_o = node.sin_o[k];
-    const bool in_cone = cos_w > cos_o;
-    const float cos_x = in_cone ? 1.0f : cos_w * cos_o + sin_w * sin_o;
-    const float sin_x = in_cone ? 0.0f : sin_w * cos_o - cos_w * sin_o;
-    const float cos_emission = (inside | (cos_x > cos_b)) ? 1.0f : cos_x * cos_b + sin_x * sin_b;
-    const float emission = cos_emission > node.cos_e[k] - kSlack ? std::max(cos_emission, kFloor) : 0.0f;
+  const Float8 x = p.x - node.cx, y = p.y - node.cy, z = p.z - node.cz;
+  Float8 d2 = x * x + y * y + z * z;
+  d2 = d2 > 1e-30f ? d2 : zero + 1e-30f;
+  const Float8 inv_d2 = 1.0f / d2;
+  Float8 inv_d = inv_d2;
+  square_root(inv_d);
 
-    // Smallest angle at which they may arrive: theta_i - theta_b.
-    const float cos_i = std::max(std::min(-(n.x * x + n.y * y + n.z * z) * inv_d, 1.0f), -1.0f);
-    const float sin_i = std::sqrt(1 - cos_i * cos_i);
-    const float cos_arrival = (inside | (cos_i > cos_b)) ? 1.0f : cos_i * cos_b + sin_i * sin_b;
-    const float arrival = std::max(any_side, cos_arrival > -kSlack ? std::max(cos_arrival, kFloor) : 0.0f);
+  // The lights are seen within theta_b; from within their sphere, in any direction.
+  Float8 sin_b = node.r * inv_d;
+  sin_b = sin_b < 1.0f ? sin_b : one;
+  const auto inside = sin_b == 1.0f;
+  Float8 cos_b = 1.0f - sin_b * sin_b;
+  square_root(cos_b);
 
-    result.importance[k] = node.phi[k] * emission * arrival / std::max(d2, r2);
+  // Smallest angle at which any of them may emit towards p: theta_w - theta_o - theta_b.
+  const Float8 along = (node.ax * x + node.ay * y + node.az * z) * inv_d, other = -along * node.two_sided;
+  Float8 cos_w = along > other ? along : other;
+  cos_w = cos_w < 1.0f ? cos_w : one;
+  Float8 sin_w = 1.0f - cos_w * cos_w;
+  sin_w = sin_w > 0.0f ? sin_w : zero;
+  square_root(sin_w);
+  const auto in_cone = cos_w > node.cos_o;
+  const Float8 cos_x = in_cone ? one : cos_w * node.cos_o + sin_w * node.sin_o;
+  const Float8 sin_x = in_cone ? zero : sin_w * node.cos_o - cos_w * node.sin_o;
+  const Float8 cos_emission = (inside | (cos_x > cos_b)) ? one : cos_x * cos_b + sin_x * sin_b;
+  Float8 importance = cos_emission > kFloor ? cos_emission : zero + kFloor;
+  importance = cos_emission > node.cos_e - kSlack ? importance : zero;
+
+  // Smallest angle at which they may arrive: theta_i - theta_b.
+  if (n != Vec3(0)) {
+    Float8 cos_i = -(n.x * x + n.y * y + n.z * z) * inv_d;
+    Float8 sin_i = 1.0f - cos_i * cos_i;
+    sin_i = sin_i > 0.0f ? sin_i : zero;
+    square_root(sin_i);
+    const Float8 cos_arrival = (inside | (cos_i > cos_b)) ? one : cos_i * cos_b + sin_i * sin_b;
+    importance *= cos_arrival > kFloor ? cos_arrival : zero + kFloor;
+    importance = cos_arrival > -kSlack ? importance : zero;
   }
-  float total = 0;
-  for (int k = 0; k < kWidth; ++k) total += result.importance[k];
-  result.total = total;
+
+  importance *= node.phi * (inv_d2 < node.inv_r2 ? inv_d2 : node.inv_r2);
+  Lanes result;
+  float sum = 0;
+  for (int k = 0; k < kWidth; ++k) {
+    result.importance[k] = importance[k];
+    result.sum[k] = sum += importance[k];
+  }
   return result;
 }
 
 LightBvh::Pick LightBvh::sample(const Lanes& root, const Vec3& p, const Vec3& n, float u) const {
-  Lanes here = root;
+  const Lanes* here = &root;
+  Lanes below;
   std::uint32_t node = 0;
   float pmf = 1;
   for (;;) {
-    if (!(here.total > 0)) return {};
-    // Find the child whose interval holds u; rounding may leave u behind the last.
-    float rest = u * here.total;
-    int lane = -1;
-    for (int k = 0; k < kWidth; ++k) {
-      if (here.importance[k] <= 0) continue;
-      if (lane >= 0) rest -= here.importance[lane];
-      lane = k;
-      if (rest < here.importance[k]) break;
-    }
-    pmf *= here.importance[lane] / here.total;
+    const float total = here->total();
+    if (!(total > 0)) return {};
+    // The child whose interval holds u: u < 1 leaves `target` below the last sum.
+    const float target = u * total;
+    int lane = 0;
+    for (int k = 0; k + 1 < kWidth; ++k) lane += here->sum[k] <= target ? 1 : 0;
+    const float importance = here->importance[lane];
+    pmf *= importance / total;
     const std::uint32_t child = nodes_[node].child[lane];
     if (child & kLeaf) return {child & ~kLeaf, pmf};
-    u = std::clamp(rest / here.importance[lane], 0.0f, kOneMinusEpsilon);
+    const float before = lane > 0 ? here->sum[lane - 1] : 0.0f;
+    u = std::clamp((target - before) / importance, 0.0f, kOneMinusEpsilon);
     node = child;
-    here = lanes(nodes_[node], p, n);
+    below = lanes(nodes_[node], p, n);
+    here = &below;
   }
 }
 
@@ -287,10 +309,10 @@ float LightBvh::pmf(const Lanes& root, const Vec3& p, const Vec3& n, std::uint32
   float pmf = 1;
   for (std::uint32_t slot = light_slot_[index];;) {
     const std::uint32_t node = slot / kWidth, lane = slot % kWidth;
-    if (node == 0) return root.total > 0 ? pmf * root.importance[lane] / root.total : 0.0f;
+    if (node == 0) return root.total() > 0 ? pmf * root.importance[lane] / root.total() : 0.0f;
     const Lanes here = lanes(nodes_[node], p, n);
     if (!(here.importance[lane] > 0)) return 0;
-    pmf *= here.importance[lane] / here.total;
+    pmf *= here.importance[lane] / here.total();
     slot = node_slot_[node];
   }
 }

@@ -35,7 +35,7 @@ class Environment {
 
  private:
   Color interpolated(const Vec3& w) const;
-  Color texel(int x, int y) const;
+  Color light_of(int x, int y) const;
   /// Where direction `w` is in the picture, in pixels.
   Vec2 picture_position(const Vec3& w) const;
 

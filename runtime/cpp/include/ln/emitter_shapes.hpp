@@ -35,6 +35,34 @@ struct AreaSample {
 
 namespace detail {
 
+/// atan2(y, x) for y >= 0, within 1e-7 (interpolated at Chebyshev's nodes).
+inline float angle_of(float y, float x) {
+  const float abs_x = std::abs(x), high = std::max(y, abs_x), low = std::min(y, abs_x);
+  const float a = high > 0 ? low / high : 0.0f, t = a * a;
+  float r = 0.0027662835f;
+  r = r * t - 0.0157312491f;
+  r = r * t + 0.0421376236f;
+  r = r * t - 0.0745685483f;
+  r = r * t + 0.106183706f;
+  r = r * t - 0.141977978f;
+  r = r * t + 0.19991872f;
+  r = r * t - 0.333330367f;
+  r = (r * t + 0.999999982f) * a;
+  r = y > abs_x ? 0.5f * kPi - r : r;
+  return x < 0 ? kPi - r : r;
+}
+inline double angle_of(double y, double x) { return std::atan2(y, x); }
+
+/// Sine and cosine of an angle in [0, pi], in the same way.
+inline void sine_cosine(float angle, float& sine, float& cosine) {
+  const bool obtuse = angle > 0.5f * kPi;
+  const float x = obtuse ? kPi - angle : angle, t = x * x;
+  sine = ((((2.60510764e-06f * t - 0.000198090174f) * t + 0.00833305017f) * t - 0.166666579f) * t + 1) * x;
+  const float c = ((((-2.60506575e-07f * t + 2.47601097e-05f) * t - 0.00138883603f) * t + 0.0416666362f) * t - 0.5f) * t + 1;
+  cosine = obtuse ? -c : c;
+}
+inline void sine_cosine(double angle, double& sine, double& cosine) { sine = std::sin(angle), cosine = std::cos(angle); }
+
 /// Tangent of half the solid angle of a triangle whose corners have distances l0, l1, l2 and inner products rij, as seen
 /// from the origin, is |determinant| / this (van Oosterom & Strackee 1983). With the determinant taken from the edges it
 /// is accurate for tiny and for nearly hemispherical triangles alike.
@@ -61,11 +89,11 @@ struct ViewedLight {
       const V r3 = r1 + V(light.e2);
       l3 = glm::length(r3);
       r03 = glm::dot(r0, r3), r13 = glm::dot(r1, r3), r32 = glm::dot(r3, r2);
-      first = std::atan2(determinant, triangle_denominator(l0, l1, l3, r01, r03, r13));
-      second = std::atan2(determinant, triangle_denominator(l0, l3, l2, r03, r02, r32));
+      first = angle_of(determinant, triangle_denominator(l0, l1, l3, r01, r03, r13));
+      second = angle_of(determinant, triangle_denominator(l0, l3, l2, r03, r02, r32));
     } else {
       r12 = glm::dot(r1, r2);
-      first = std::atan2(determinant, triangle_denominator(l0, l1, l2, r01, r02, r12));
+      first = angle_of(determinant, triangle_denominator(l0, l1, l2, r01, r02, r12));
       second = 0;
     }
   }
@@ -83,30 +111,35 @@ struct ViewedLight {
       lc = l3, r0c = r03, rbc = r13;
     }
 
-    // Corner c moves along its arc to c' = k_b b + k_c c (unit vectors), such that (0, b, c') has the solid angle 2 tau.
+    // Corner c moves along its arc to c' = (k_b b + k_c c) / norm (unit vectors), such that (0, b, c') has the solid
+    // angle 2 tau.
     const T inv_l0 = 1 / l0, inv_lb = 1 / lb, inv_lc = 1 / lc;
     const T cos_bc = rbc * inv_lb * inv_lc;
-    const T g0 = determinant * inv_l0 * inv_lb * inv_lc;
-    const T g1 = r0c * inv_l0 * inv_lc + cos_bc;
-    const T g2 = 1 + r0b * inv_l0 * inv_lb;
-    const T sin_tau = std::sin(tau), cos_tau = std::cos(tau);
-    const T x = g0 * cos_tau - g1 * sin_tau, y = g2 * sin_tau;
+    const T g1 = r0c * lb + rbc * l0, g2 = l0 * lb * lc + r0b * lc;
+    T sin_tau, cos_tau;
+    sine_cosine(tau, sin_tau, cos_tau);
+    // Normalised, as squares of these can be too small for float.
+    const T scale = inv_l0 * inv_lb * inv_lc;
+    const T x = (determinant * cos_tau - g1 * sin_tau) * scale, y = g2 * sin_tau * scale;
     const T norm = x * x + y * y + 2 * x * y * cos_bc;
     if (!(norm > 0)) return {};
-    const T k_b = (x * x - y * y) / norm, k_c = 2 * y * (x + y * cos_bc) / norm;
+    const T k_b = x * x - y * y, k_c = 2 * y * (x + y * cos_bc);
 
-    // A point on the arc from corner 0 to c': k_0 a + k c'.
-    const T one_minus_cos = std::max(T(0), 1 - (k_b * r0b * inv_lb + k_c * r0c * inv_lc) * inv_l0);
-    const T k = std::sqrt(std::max(T(0), u.y * (2 - u.y * one_minus_cos) / (2 - one_minus_cos)));
-    const T k_0 = 1 - u.y * one_minus_cos - k * (1 - one_minus_cos);
+    // A point on the arc from corner 0 to c': k_0 a + k c'. The arc's cosine is c / norm.
+    const T inv_norm = 1 / norm;
+    const T c = std::min((k_b * r0b * inv_lb + k_c * r0c * inv_lc) * inv_l0, norm), part = T(u.y) * (norm - c);
+    const T k = std::sqrt(std::max(T(0), u.y * (2 * norm - part) / (norm + c)));
+    const T k_0 = 1 - (part + k * c) * inv_norm, k_1 = k * inv_norm;
 
     // Onto the plane of the light.
-    const T w0 = std::max(T(0), k_0 * inv_l0), wb = std::max(T(0), k * k_b * inv_lb), wc = std::max(T(0), k * k_c * inv_lc);
+    const T w0 = std::max(T(0), k_0 * inv_l0), wb = std::max(T(0), k_1 * k_b * inv_lb), wc = std::max(T(0), k_1 * k_c * inv_lc);
     const T sum = w0 + wb + wc;
     if (!(sum > 0) || !std::isfinite(sum)) return {};
-    const auto b = static_cast<float>(wb / sum), c = static_cast<float>(wc / sum);
-    if (!quad) return {b, c, 1};
-    return in_second ? AreaSample{b, std::min(b + c, 1.0f), 1} : AreaSample{std::min(b + c, 1.0f), c, 1};
+    const T inv_sum = 1 / sum;
+    const auto at_b = static_cast<float>(wb * inv_sum), at_c = static_cast<float>(wc * inv_sum);
+    if (!quad) return {at_b, at_c, 1};
+    const float both = std::min(at_b + at_c, 1.0f);
+    return in_second ? AreaSample{at_b, both, 1} : AreaSample{both, at_c, 1};
   }
 };
 

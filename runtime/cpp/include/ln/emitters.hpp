@@ -134,7 +134,7 @@ class Emitters {
   float surface_pdf_w(const Surface& surface, const SurfacePosition& at, const Vec3& n, const Hit& hit) const;
   Color surface_radiance(const Surface& surface, const Hit& hit, const Vec3& w_out) const;
   Color varying_radiance(std::uint32_t triangle, float u, float v) const;
-  Color mean_radiance(std::uint32_t triangle) const;
+  Color mean_radiance(std::uint32_t triangle, int most_samples) const;
 
   const SceneData* scene_;
   bool has_surfaces_ = false;

@@ -1,6 +1,6 @@
 #pragma once
 // Importance of many lights for a receiver (Conty & Kulla 2018; Pharr, Jakob & Humphreys, PBR 4th ed., section 12.6.3),
-// with eight children a node: they are compared with each other in one vectorised loop.
+// with eight children a node, which are compared with each other in one go.
 
 #include <vector>
 
@@ -26,10 +26,11 @@ class LightBvh {
     std::uint32_t index = 0;
     float pmf = 0;  // 0: no light can contribute
   };
-  /// Importances of the children of a node.
+  /// Importances of the children of a node, and their running sums.
   struct Lanes {
     float importance[kWidth];
-    float total;
+    float sum[kWidth];
+    float total() const { return sum[kWidth - 1]; }
   };
 
   LightBvh() = default;
@@ -48,15 +49,19 @@ class LightBvh {
  private:
   static constexpr std::uint32_t kLeaf = 0x80000000u;
 
-  struct alignas(64) Node {
-    float cx[kWidth], cy[kWidth], cz[kWidth], r2[kWidth];
-    float ax[kWidth], ay[kWidth], az[kWidth];
-    float cos_o[kWidth], sin_o[kWidth], cos_e[kWidth];
-    float phi[kWidth];         // 0: no child
-    float two_sided[kWidth];   // 1 or -1
+  using Float8 = float __attribute__((vector_size(kWidth * sizeof(float))));
+
+  struct Node {
+    Float8 cx, cy, cz;            // centres
+    Float8 r, inv_r2;             // radii
+    Float8 ax, ay, az;            // axes
+    Float8 cos_o, sin_o, cos_e;
+    Float8 phi;                   // 0: no child
+    Float8 two_sided;             // 1 or -1
     std::uint32_t child[kWidth];  // a node, or kLeaf | light
   };
 
+  static void square_root(Float8& x);
   static Lanes lanes(const Node& node, const Vec3& p, const Vec3& n);
 
   std::vector<Node> nodes_;

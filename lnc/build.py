@@ -8,6 +8,7 @@ import hashlib
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -52,7 +53,8 @@ def build_program(cpp: str, include_folders: Iterable[Path], output: Path, optio
     programs.mkdir(parents=True, exist_ok=True)
     program = programs / key
     if not program.exists():
-        with _lock(programs / f"{key}.lock"):
+        # Not while the library is being built again.
+        with _lock(programs / f"{key}.lock"), _lock(runtime.folder / "lock", shared=True):
             if not program.exists():
                 _compile(cpp, folders, runtime, program)
     _install(program, output)
@@ -64,27 +66,35 @@ def program_path(output: Path) -> Path:
 
 
 def build_runtime(options: BuildOptions, quiet: bool = False) -> Runtime:
-    """The runtime library, built if this machine does not have it yet (about two minutes, once)."""
+    """The runtime library, built if this machine does not have it yet (about two minutes, once).
+
+    Its build folder belongs to the sources' place, the compiler and the processor. When sources change, only what they
+    touch is built again.
+    """
     root = data_root()
     compiler = os.environ.get("CXX", "c++")
-    parts = [
-        _tree_digest(root / "runtime" / "cpp", (".cpp", ".hpp", ".S")),
-        (root / "CMakeLists.txt").read_text(),
-        _compiler_identity(compiler),
-        "portable" if options.portable else _processor(),
-    ]
-    key = _digest(parts)
-    folder = _writable_cache() / "runtime" / key
-    done = folder / "done"
-    if not done.exists():
+    machine = [_compiler_identity(compiler), "portable" if options.portable else _processor()]
+    folder = _writable_cache() / "runtime" / _digest([str(root), *machine])[:16]
+    sources = _tree_digest(root / "runtime" / "cpp", (".cpp", ".hpp", ".S"))
+    key = _digest([sources, (root / "CMakeLists.txt").read_text(), *machine])
+    done = folder / "built"
+    if _text_of(done) != key:
         folder.mkdir(parents=True, exist_ok=True)
         with _lock(folder / "lock"):
-            if not done.exists():
+            if _text_of(done) != key:
                 if not quiet:
-                    print("lnc: building the runtime library for this machine (once; about two minutes)", flush=True)
+                    again = " again: its sources have changed" if done.exists() else " (once for this machine; some two minutes)"
+                    print(f"lnc: building the runtime library{again}", file=sys.stderr, flush=True)
                 _cmake(root, folder, options)
-                done.touch()
+                done.write_text(key)
     return _read_flags(key, folder)
+
+
+def _text_of(file: Path) -> str | None:
+    try:
+        return file.read_text()
+    except OSError:
+        return None
 
 
 def _cmake(root: Path, folder: Path, options: BuildOptions) -> None:
@@ -166,10 +176,10 @@ def _writable_cache() -> Path:
 
 
 @contextlib.contextmanager
-def _lock(path: Path) -> Iterator[None]:
-    """Holds an exclusive lock: two compilations of the same thing wait for each other."""
+def _lock(path: Path, shared: bool = False) -> Iterator[None]:
+    """Holds a lock: two compilations of the same thing wait for each other."""
     with path.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
+        fcntl.flock(file, fcntl.LOCK_SH if shared else fcntl.LOCK_EX)
         yield
 
 

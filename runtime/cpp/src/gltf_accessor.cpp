@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "gltf_model.hpp"
 #include "ln/text.hpp"
 
 namespace ln::gltf {
@@ -37,7 +38,7 @@ ByteView place(const Model& model, Json at, std::string_view member, std::size_t
 
 }  // namespace
 
-Accessor::Accessor(const Model& model, std::size_t index) : json_(model.accessors[index]) {
+Accessor::Accessor(const Model& model, Json json) : json_(json) {
   count_ = json_["count"].index();
   type_ = static_cast<ComponentType>(json_["componentType"].integer(0));
   normalized_ = json_["normalized"].boolean(false);
@@ -135,13 +136,6 @@ void Accessor::check_sparse_order() const {
     const bool ascending = i == 0 || sparse_index(i) > sparse_index(i - 1);
     if (!ascending) json_["sparse"].fail("indices", "element " + std::to_string(i) + " is not above the one before it");
     if (sparse_index(i) >= count_) json_["sparse"].fail("indices", "there is no element " + std::to_string(sparse_index(i)) + " to substitute");
-  }
-}
-
-void check_accessors(const Model& model) {
-  for (std::size_t i = 0; i < model.accessors.size(); ++i) {
-    const Accessor accessor(model, i);
-    accessor.check_sparse_order();
   }
 }
 

@@ -5,10 +5,13 @@
 #include <cstdint>
 #include <string_view>
 
-#include "gltf_model.hpp"
+#include "gltf_byte_view.hpp"
+#include "gltf_json.hpp"
 #include "ln/math.hpp"
 
 namespace ln::gltf {
+
+struct Model;
 
 enum class ComponentType : std::uint16_t { i8 = 5120, u8 = 5121, i16 = 5122, u16 = 5123, u32 = 5125, f32 = 5126 };
 constexpr std::size_t component_bytes(ComponentType type) {
@@ -20,7 +23,7 @@ class Accessor {
  public:
   Accessor() = default;
   /// Checks that all elements lie within their buffer views; throws Error naming the accessor.
-  Accessor(const Model& model, std::size_t index);
+  Accessor(const Model& model, Json json);
 
   explicit operator bool() const { return count_ > 0; }
   std::size_t count() const { return count_; }
@@ -75,8 +78,5 @@ class Accessor {
   ComponentType sparse_type_ = ComponentType::u32;
   ByteView sparse_indices_, sparse_values_;
 };
-
-/// Checks every accessor of the file, used or not. Throws Error.
-void check_accessors(const Model& model);
 
 }  // namespace ln::gltf

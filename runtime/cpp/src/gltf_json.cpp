@@ -49,6 +49,7 @@ class JsonBuilder {
   bool end_array() { return close(); }
   bool end_object() {
     refuse_duplicate_keys(open_.back());
+    index_members(open_.back());
     return close();
   }
 
@@ -107,6 +108,13 @@ class JsonBuilder {
     throw Error(document_.file_ + ": the member \"" + printable(document_.keys_[*twice - 1], 60) + "\" occurs twice in one object");
   }
 
+  void index_members(std::uint32_t object) {
+    if (document_.entries_[object].size < JsonDocument::kManyMembers) return;
+    auto& index = document_.member_index_[object];
+    const auto end = static_cast<std::uint32_t>(document_.entries_.size());
+    for (std::uint32_t i = object + 1; i < end; i = document_.next(i)) index[document_.entries_[i].key] = i;
+  }
+
   /// Keeps the characters where they never move: large strings as they are, small ones together in blocks.
   const char* store(std::string& value) {
     constexpr std::size_t kBlock = 1 << 16;
@@ -157,6 +165,13 @@ Json::Iterator Json::end() const {
 
 Json Json::operator[](std::string_view member) const {
   if (!is_object()) return {};
+  if (size() >= JsonDocument::kManyMembers) {
+    const auto key = document_->key_index_.find(member);
+    if (key == document_->key_index_.end()) return {};
+    const auto& index = document_->member_index_.at(index_);
+    const auto found = index.find(key->second);
+    return found == index.end() ? Json{} : Json{document_, found->second};
+  }
   for (const Json value : *this) {
     if (value.key() == member) return value;
   }

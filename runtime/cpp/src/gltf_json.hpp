@@ -105,6 +105,8 @@ class JsonDocument {
   };
   static_assert(sizeof(Entry) == 16);
 
+  static constexpr std::uint32_t kManyMembers = 64;
+
   std::uint32_t next(std::uint32_t index) const;
 
   std::string file_;
@@ -112,6 +114,8 @@ class JsonDocument {
   std::deque<std::string> keys_;
   std::unordered_map<std::string_view, std::uint32_t> key_index_;
   std::deque<std::string> strings_;
+  // Members by name, for objects that have many: [object][key] -> entry.
+  std::unordered_map<std::uint32_t, std::unordered_map<std::uint32_t, std::uint32_t>> member_index_;
 };
 
 /// Random access to the elements of an array; empty for nothing.

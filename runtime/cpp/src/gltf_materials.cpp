@@ -70,21 +70,39 @@ std::uint8_t uv_set(Json texcoord, Json info, UvSets& sets) {
 
 }  // namespace
 
+std::string read_name(Json json) {
+  constexpr std::size_t kLongest = 1000;
+  return std::string(json["name"].text().substr(0, kLongest));
+}
+
 void read_tags(Json json, std::vector<std::string>& tags) {
+  constexpr std::size_t kMost = 64, kLongest = 256;
   const Json found = json["extras"]["tags"];
   if (!found) return;
   const auto add = [&](Json tag) {
-    if (tag.kind() == JsonKind::string) tags.emplace_back(tag.text());
+    if (tag.kind() == JsonKind::string && tag.text().size() <= kLongest) tags.emplace_back(tag.text());
   };
   add(found);
-  for (const Json tag : found) add(tag);
+  std::size_t read = 0;
+  for (const Json tag : found) {
+    if (read++ == kMost) break;
+    add(tag);
+  }
+}
+
+double name_and_tags_bytes(Json json) {
+  std::vector<std::string> tags;
+  read_tags(json, tags);
+  auto bytes = static_cast<double>(read_name(json).size());
+  for (const std::string& tag : tags) bytes += static_cast<double>(sizeof(std::string) + tag.size());
+  return bytes;
 }
 
 std::uint32_t MaterialReader::use(Json index) {
   const std::int64_t key = index.integer(-1);
   const auto [found, is_new] = used_.emplace(key, static_cast<std::uint32_t>(scene_.materials.size()));
   if (is_new) {
-    model_.memory.claim(sizeof(Material), "the materials");
+    model_.memory.claim(sizeof(Material) + 1000, "a material");
     UvSets sets{0, 1};
     scene_.materials.push_back(key < 0 ? Material{} : read(model_.materials[static_cast<std::size_t>(key)], sets));
     uv_sets_.push_back(sets);
@@ -94,7 +112,7 @@ std::uint32_t MaterialReader::use(Json index) {
 
 Material MaterialReader::read(Json json, UvSets& sets) {
   Material m;
-  m.name = json["name"].text();
+  m.name = read_name(json);
   read_tags(json, m.tags);
 
   const Json metallic_roughness = json["pbrMetallicRoughness"], extensions = json["extensions"];
@@ -188,31 +206,36 @@ TextureRef MaterialReader::texture(Json info, bool srgb, UvSets& sets) {
 }
 
 int MaterialReader::image(std::size_t index, bool srgb) {
-  const auto [found, is_new] = images_.emplace(std::pair{index, srgb}, static_cast<int>(scene_.images.size()));
-  if (is_new) {
-    scene_.images.push_back(read_image(index, srgb));
-  }
+  const auto [found, is_new] = images_.emplace(std::pair{index, srgb}, -1);
+  if (is_new) found->second = read_image(index, srgb);
   return found->second;
 }
 
-Image MaterialReader::read_image(std::size_t index, bool srgb) {
+int MaterialReader::read_image(std::size_t index, bool srgb) {
   const Json json = model_.images[index], uri = json["uri"], view = json["bufferView"];
   if (!uri && !view) json.fail("has neither uri nor bufferView");
-  const bool is_named = uri && !is_data_uri(uri.text());
+  const bool is_file = uri && !is_data_uri(uri.text());
   try {
-    Bytes held;
+    if (uri && !is_file) return decode(decode_data_uri(uri.text(), model_.memory).span(), srgb);
     std::span<const std::uint8_t> bytes;
-    if (uri) {
-      held = is_named ? model_.folder.read_uri(uri.text(), model_.memory) : decode_data_uri(uri.text(), model_.memory);
-      bytes = held.span();
+    if (is_file) {
+      bytes = model_.folder.read_uri(uri.text(), model_.memory).span();
     } else {
       const ByteView data = model_.view(view.index());
       bytes = data.part(0, data.size());
     }
-    return decode_image(bytes, srgb, [&](double size) { model_.memory.claim(size, "the decoded image"); });
+    // Files and buffers stay in memory: several images may be the same bytes.
+    const auto [known, is_new] = decoded_.emplace(std::tuple{bytes.data(), bytes.size(), srgb}, -1);
+    if (is_new) known->second = decode(bytes, srgb);
+    return known->second;
   } catch (const Error& error) {
-    json.fail((is_named ? "\"" + printable(uri.text(), 120) + "\": " : "") + error.what());
+    json.fail((is_file ? "\"" + printable(uri.text(), 120) + "\": " : "") + error.what());
   }
+}
+
+int MaterialReader::decode(std::span<const std::uint8_t> bytes, bool srgb) {
+  scene_.images.push_back(decode_image(bytes, srgb, [&](double size) { model_.memory.claim(size, "the decoded image"); }));
+  return static_cast<int>(scene_.images.size()) - 1;
 }
 
 }  // namespace ln::gltf

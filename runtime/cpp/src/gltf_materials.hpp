@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -31,16 +33,23 @@ class MaterialReader {
   void read_specular_glossiness(Json json, Material& material, UvSets& sets);
   TextureRef texture(Json info, bool srgb, UvSets& sets);
   int image(std::size_t index, bool srgb);
-  Image read_image(std::size_t index, bool srgb);
+  int read_image(std::size_t index, bool srgb);
+  int decode(std::span<const std::uint8_t> bytes, bool srgb);
 
   Model& model_;
   SceneData& scene_;
   std::map<std::int64_t, std::uint32_t> used_;  // -1: the default material
-  std::map<std::pair<std::size_t, bool>, int> images_;
+  std::map<std::pair<std::size_t, bool>, int> images_;                          // by index and encoding
+  std::map<std::tuple<const std::uint8_t*, std::size_t, bool>, int> decoded_;  // by the bytes of the file
   std::vector<UvSets> uv_sets_;
 };
 
-/// `extras.tags`: a string or an array of strings; other applications may mean something else by it, which is no error.
+/// The name of an object; at most 1,000 bytes of it.
+std::string read_name(Json json);
+/// `extras.tags`: a string or an array of strings, of which up to 64 with up to 256 bytes each are read. Other applications may
+/// mean something else by it, which is no error.
 void read_tags(Json json, std::vector<std::string>& tags);
+/// The memory that the name and tags of an object take.
+double name_and_tags_bytes(Json json);
 
 }  // namespace ln::gltf

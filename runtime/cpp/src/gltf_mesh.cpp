@@ -51,8 +51,11 @@ constexpr double kLargestCoordinate = 1e30;
 
 bool is_usable(const DVec3& p) { return std::abs(p.x) <= kLargestCoordinate && std::abs(p.y) <= kLargestCoordinate && std::abs(p.z) <= kLargestCoordinate; }
 
-/// Transposed adjugate: the inverse transpose times the determinant, defined for singular matrices too.
-glm::dmat3 cofactors(const glm::dmat3& m) { return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])}; }
+/// What normals are transformed by: the inverse transpose times the absolute determinant, defined for singular matrices too.
+glm::dmat3 normal_matrix(const glm::dmat3& m) {
+  const double side = glm::determinant(m) < 0 ? -1 : 1;
+  return {side * glm::cross(m[1], m[2]), side * glm::cross(m[2], m[0]), side * glm::cross(m[0], m[1])};
+}
 
 /// A unit vector, or zero if `v` has no direction.
 Vec3 unit_or_zero(const DVec3& v) {
@@ -80,8 +83,10 @@ MeshSize MeshWriter::measure(Json mesh) const {
   for (const Json primitive : mesh["primitives"]) {
     const Json position = primitive["attributes"]["POSITION"], indices = primitive["indices"];
     if (!position) continue;
-    const auto count_of = [&](Json accessor) { return static_cast<std::size_t>(model_.accessors[accessor.index()]["count"].integer(0)); };
+    const auto count_of = [&](Json accessor) { return model_.accessors[accessor.index()].count(); };
     const std::size_t vertices = count_of(position), corners = indices ? count_of(indices) : vertices;
+    require_count(primitive["attributes"], vertices);
+    for (const Json target : primitive["targets"]) require_count(target, vertices);
     const auto triangles = static_cast<double>(triangle_count(primitive["mode"].integer(kTriangles), corners));
     const auto used = triangles == 0 ? 0.0 : static_cast<double>(std::min(vertices, corners));
     double vertex_bytes = sizeof(DVec3) + sizeof(Vec3);
@@ -90,7 +95,7 @@ MeshSize MeshWriter::measure(Json mesh) const {
       vertex_bytes += name == "NORMAL" ? sizeof(Vec3) : name == "TANGENT" || name == "COLOR_0" ? sizeof(Vec4) : name.starts_with("TEXCOORD_") ? sizeof(Vec2) : 0;
     }
     size.triangles += triangles;
-    size.bytes += sizeof(Part) + triangles * (sizeof(UVec3) + sizeof(std::uint32_t)) + used * vertex_bytes;
+    if (triangles > 0) size.bytes += sizeof(Part) + triangles * (sizeof(UVec3) + sizeof(std::uint32_t)) + used * vertex_bytes;
   }
   return size;
 }
@@ -105,15 +110,15 @@ void MeshWriter::check(Json mesh) {
   for (const Json primitive : mesh["primitives"]) {
     const Json position = primitive["attributes"]["POSITION"];
     if (!position || primitive["mode"].integer(kTriangles) < kTriangles) continue;
-    read_corners(primitive, static_cast<std::size_t>(model_.accessors[position.index()]["count"].integer(0)));
-    read_attributes(primitive, {mesh, mesh, {}, nullptr}, UvSets{});
+    read_corners(primitive, model_.accessors[position.index()].count());
+    read_attributes(primitive, {{}, mesh, {}, nullptr}, UvSets{});
   }
 }
 
 Accessor MeshWriter::attribute(Json attributes, std::string_view name, std::string_view types, unsigned formats, unsigned quantized_formats) {
   const Json reference = attributes[name];
   if (!reference) return {};
-  Accessor accessor(model_, reference.index());
+  Accessor accessor = model_.accessors[reference.index()];
   const unsigned format = format_bit(accessor.component_type(), accessor.normalized());
   const bool known = types.find(accessor.type()) != std::string_view::npos && (format & (formats | quantized_formats)) != 0;
   if (!known) reference.fail(format_text(accessor) + " is not a format for this");
@@ -124,7 +129,7 @@ Accessor MeshWriter::attribute(Json attributes, std::string_view name, std::stri
 /// All attributes of a primitive and its targets have as many elements as POSITION, also those that are not read.
 void MeshWriter::require_count(Json attributes, std::size_t wanted) const {
   for (const Json member : attributes) {
-    const auto count = static_cast<std::size_t>(model_.accessors[member.index()]["count"].integer(0));
+    const auto count = model_.accessors[member.index()].count();
     if (count != wanted) member.fail("has " + std::to_string(count) + " elements, POSITION has " + std::to_string(wanted));
   }
 }
@@ -159,11 +164,9 @@ MeshWriter::Attributes MeshWriter::read_attributes(Json primitive, const Placeme
   for (const Json target : primitive["targets"]) {
     const double weight = i < weight_of.size() ? weight_of[i] : 0;
     ++i;
-    require_count(target, a.position.count());
     if (weight == 0) continue;
     a.targets.push_back({weight, attribute(target, "POSITION", "VEC3", kF32, kAnySmall), attribute(target, "NORMAL", "VEC3", kF32, kI8N | kI16N), attribute(target, "TANGENT", "VEC3", kF32, kI8N | kI16N)});
   }
-  require_count(json, a.position.count());
   return a;
 }
 
@@ -233,8 +236,7 @@ void MeshWriter::number_vertices(std::size_t vertex_count) {
 void MeshWriter::add_primitive(Json primitive, const Placement& placement) {
   const Json position = primitive["attributes"]["POSITION"];
   if (!position) return model_.notes.count("primitive without positions is ignored", "primitives without positions are ignored", 1);
-  const Json count = model_.accessors[position.index()]["count"];
-  if (!read_corners(primitive, count.index())) return;
+  if (!read_corners(primitive, model_.accessors[position.index()].count())) return;
 
   Part part;
   part.material = materials_.use(primitive["material"]);
@@ -242,53 +244,69 @@ void MeshWriter::add_primitive(Json primitive, const Placement& placement) {
   if (!attributes.position.has_data() && primitive["extensions"]["KHR_draco_mesh_compression"]) primitive.fail("the extension KHR_draco_mesh_compression is not supported, and there is no uncompressed data beside it");
   number_vertices(attributes.position.count());
 
-  part.first_triangle = static_cast<std::uint32_t>(scene_.triangles.size());
   part.has_normals = static_cast<bool>(attributes.normal);
   part.has_tangents = attributes.tangent && attributes.normal;
   part.has_colors = static_cast<bool>(attributes.color);
-  part.mesh = placement.mesh["name"].text();
-  part.node = placement.node["name"].text();
+  part.mesh = read_name(placement.mesh);
+  part.node = read_name(placement.node);
   read_tags(placement.node, part.tags);
   read_tags(placement.mesh, part.tags);
 
-  if (world_.size() + vertices_.size() > UINT32_MAX || scene_.triangles.size() + corners_.size() / 3 > UINT32_MAX) primitive.fail("the scene has more than 4,294,967,295 vertices or triangles");
-  const auto first_vertex = static_cast<std::uint32_t>(world_.size());
-  std::vector<bool> mirrored;
-  mirrored.reserve(vertices_.size());
-  for (const std::uint32_t vertex : vertices_) {
-    const Affine transform = vertex_transform(attributes, placement, vertex);
-    mirrored.push_back(glm::determinant(transform.linear) < 0);
-    append_vertex(attributes, part, transform, vertex);
+  const bool is_strip = primitive["mode"].integer(kTriangles) == kStrip;
+  for (const Affine& world : placement.worlds) {
+    if (world_.size() + vertices_.size() > UINT32_MAX || scene_.triangles.size() + corners_.size() / 3 > UINT32_MAX) {
+      primitive.fail("the scene has more than 4,294,967,295 vertices or triangles");
+    }
+    append_part(part, attributes, world, placement.joints, is_strip);
   }
-  append_triangles(mirrored, first_vertex, primitive["mode"].integer(kTriangles) == kStrip);
+}
+
+void MeshWriter::append_part(Part part, const Attributes& attributes, const Affine& world, const std::vector<Affine>* joints, bool is_strip) {
+  const auto first_vertex = static_cast<std::uint32_t>(world_.size());
+  part.first_triangle = static_cast<std::uint32_t>(scene_.triangles.size());
+  std::vector<bool> mirrored(vertices_.size(), false);
+  const auto append = [&](std::size_t i, const Affine& transform, const glm::dmat3& normal_transform, bool is_mirrored) {
+    mirrored[i] = is_mirrored;
+    append_vertex(attributes, part, transform, normal_transform, vertices_[i]);
+  };
+  if (joints == nullptr || attributes.joints.empty()) {
+    const bool is_mirrored = glm::determinant(world.linear) < 0;
+    const glm::dmat3 normal_transform = normal_matrix(world.linear);
+    for (std::size_t i = 0; i < vertices_.size(); ++i) append(i, world, normal_transform, is_mirrored);
+  } else {
+    for (std::size_t i = 0; i < vertices_.size(); ++i) {
+      const Affine transform = skin_transform(attributes, *joints, world, vertices_[i]);
+      append(i, transform, normal_matrix(transform.linear), glm::determinant(transform.linear) < 0);
+    }
+  }
+  append_triangles(mirrored, first_vertex, is_strip);
   part.triangle_count = static_cast<std::uint32_t>(scene_.triangles.size()) - part.first_triangle;
   if (part.triangle_count == 0) return;
   scene_.triangle_part.resize(scene_.triangles.size(), static_cast<std::uint32_t>(scene_.parts.size()));
   scene_.parts.push_back(std::move(part));
 }
 
-/// The node's transform, or for skinned meshes the joints' mean, weighted as the vertex says.
-Affine MeshWriter::vertex_transform(const Attributes& attributes, const Placement& placement, std::size_t vertex) const {
-  if (placement.joints == nullptr || attributes.joints.empty()) return placement.world;
+/// The joints' mean transform, weighted as the vertex says; the node's own if it says nothing.
+Affine MeshWriter::skin_transform(const Attributes& attributes, const std::vector<Affine>& joints, const Affine& world, std::size_t vertex) const {
   Affine sum{glm::dmat3(0.0), DVec3(0.0)};
   double total = 0;
   for (std::size_t set = 0; set < attributes.joints.size(); ++set) {
-    const auto joints = attributes.joints[set].get<4>(vertex), weights = attributes.weights[set].get<4>(vertex);
+    const auto indices = attributes.joints[set].get<4>(vertex), weights = attributes.weights[set].get<4>(vertex);
     for (std::size_t k = 0; k < 4; ++k) {
       if (weights[k] == 0) continue;
-      const auto joint = static_cast<std::size_t>(joints[k]);
-      if (joint >= placement.joints->size()) attributes.joints[set].json().fail("element " + std::to_string(vertex) + " names joint " + std::to_string(joint) + ", but the skin has only " + std::to_string(placement.joints->size()));
-      const Affine& matrix = (*placement.joints)[joint];
-      sum.linear += matrix.linear * weights[k];
-      sum.translation += matrix.translation * weights[k];
+      const auto joint = static_cast<std::size_t>(indices[k]);
+      if (joint >= joints.size()) {
+        attributes.joints[set].json().fail("element " + std::to_string(vertex) + " names joint " + std::to_string(joint) + ", but the skin has only " + std::to_string(joints.size()));
+      }
+      sum.linear += joints[joint].linear * weights[k];
+      sum.translation += joints[joint].translation * weights[k];
       total += weights[k];
     }
   }
-  if (!(std::abs(total) > 0)) return placement.world;
-  return {sum.linear / total, sum.translation / total};
+  return total == 0 ? world : Affine{sum.linear / total, sum.translation / total};
 }
 
-void MeshWriter::append_vertex(const Attributes& attributes, const Part& part, const Affine& transform, std::size_t vertex) {
+void MeshWriter::append_vertex(const Attributes& attributes, const Part& part, const Affine& transform, const glm::dmat3& normal_transform, std::size_t vertex) {
   const std::size_t before = world_.size();
   DVec3 position = attributes.position.vec3(vertex), normal(0.0);
   std::array<double, 4> tangent{};
@@ -303,12 +321,15 @@ void MeshWriter::append_vertex(const Attributes& attributes, const Part& part, c
   }
   world_.push_back(transform.point(position));
 
-  const double side = glm::determinant(transform.linear) < 0 ? -1 : 1;
-  const Vec3 world_normal = part.has_normals ? unit_or_zero(side * (cofactors(transform.linear) * normal)) : Vec3(0);
-  append(scene_.normals, before, part.has_normals, world_normal, Vec3(0));
-  const Vec3 direction = unit_or_zero(transform.linear * DVec3(tangent[0], tangent[1], tangent[2]));
-  const double handedness = (tangent[3] < 0 ? -1 : 1) * side;
-  append(scene_.tangents, before, part.has_tangents, Vec4(direction.x, direction.y, direction.z, handedness), Vec4(0));
+  append(scene_.normals, before, part.has_normals, part.has_normals ? unit_or_zero(normal_transform * normal) : Vec3(0), Vec3(0));
+  Vec4 world_tangent(0);
+  if (part.has_tangents) {
+    // Under a mirroring transform the bitangent turns against normal x tangent.
+    const double side = glm::dot(glm::cross(transform.linear[0], transform.linear[1]), transform.linear[2]) < 0 ? -1 : 1;
+    const Vec3 direction = unit_or_zero(transform.linear * DVec3(tangent[0], tangent[1], tangent[2]));
+    world_tangent = Vec4(direction, (tangent[3] < 0 ? -1 : 1) * side);
+  }
+  append(scene_.tangents, before, part.has_tangents, world_tangent, Vec4(0));
 
   for (const std::size_t set : {0, 1}) {
     const Accessor& uv = attributes.uv[set];

@@ -10,11 +10,11 @@
 
 namespace ln::gltf {
 
-/// A mesh where a node puts it.
+/// A mesh where a node puts it: once, or several times (EXT_mesh_gpu_instancing).
 struct Placement {
   Json node, mesh;
-  Affine world;
-  const std::vector<Affine>* joints = nullptr;  // of the node's skin at rest; they replace `world`
+  std::vector<Affine> worlds;
+  const std::vector<Affine>* joints = nullptr;  // of the node's skin at rest; they replace the worlds
 };
 
 /// How much a mesh will need, from its accessors' counts alone.
@@ -54,8 +54,9 @@ class MeshWriter {
   Accessor attribute(Json attributes, std::string_view name, std::string_view types, unsigned formats, unsigned quantized_formats);
   bool read_corners(Json primitive, std::size_t vertex_count);
   void number_vertices(std::size_t vertex_count);
-  Affine vertex_transform(const Attributes& attributes, const Placement& placement, std::size_t vertex) const;
-  void append_vertex(const Attributes& attributes, const Part& part, const Affine& transform, std::size_t vertex);
+  Affine skin_transform(const Attributes& attributes, const std::vector<Affine>& joints, const Affine& world, std::size_t vertex) const;
+  void append_part(Part part, const Attributes& attributes, const Affine& world, const std::vector<Affine>* joints, bool is_strip);
+  void append_vertex(const Attributes& attributes, const Part& part, const Affine& transform, const glm::dmat3& normal_transform, std::size_t vertex);
   void append_triangles(const std::vector<bool>& mirrored, std::uint32_t first_vertex, bool is_strip);
 
   Model& model_;

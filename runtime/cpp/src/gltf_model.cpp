@@ -12,6 +12,11 @@
 namespace ln::gltf {
 
 void Notes::count(std::string singular, std::string plural, double n) {
+  constexpr std::size_t kMost = 40;
+  if (notes_.size() >= kMost && index_.find(singular) == index_.end()) {
+    ++left_out_;
+    return;
+  }
   const auto [found, is_new] = index_.emplace(singular, notes_.size());
   if (is_new) {
     notes_.push_back({std::move(singular), std::move(plural), n});
@@ -25,6 +30,7 @@ std::vector<std::string> Notes::take() const {
   for (const Note& note : notes_) {
     texts.push_back(note.n == 0 ? note.singular : number_text(note.n) + " " + (note.n == 1 ? note.singular : note.plural));
   }
+  if (left_out_ > 0) texts.push_back("... and " + number_text(left_out_) + " more of this kind");
   return texts;
 }
 
@@ -32,12 +38,12 @@ std::vector<std::string> Notes::take() const {
 
 namespace {
 
-/// Extensions that are read, or say nothing about a picture at rest.
-constexpr std::array<std::string_view, 14> kRead{
-    "KHR_lights_punctual",      "KHR_materials_emissive_strength", "KHR_materials_ior",   "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_specular",   "KHR_materials_transmission",      "KHR_materials_unlit", "KHR_materials_volume",
-    "KHR_texture_transform",    "KHR_mesh_quantization",           "KHR_xmp",             "KHR_xmp_json_ld",
-    "EXT_mesh_gpu_instancing",  "KHR_animation_pointer"};
+/// Extensions that are read, or say nothing about a picture of the default state at rest.
+constexpr std::array<std::string_view, 15> kRead{
+    "KHR_lights_punctual",     "KHR_materials_emissive_strength", "KHR_materials_ior",      "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_specular",  "KHR_materials_transmission",      "KHR_materials_unlit",    "KHR_materials_volume",
+    "KHR_texture_transform",   "KHR_mesh_quantization",           "KHR_xmp",                "KHR_xmp_json_ld",
+    "EXT_mesh_gpu_instancing", "KHR_animation_pointer",           "KHR_materials_variants"};
 
 constexpr std::string_view kMeshopt = "EXT_meshopt_compression";
 
@@ -85,7 +91,7 @@ Model::Model(const std::string& path, std::uint64_t max_bytes) : memory(max_byte
 
   check_version();
   check_schema(root());
-  accessors = JsonArray(root()["accessors"]);
+  const JsonArray accessor_json(root()["accessors"]);
   buffer_views = JsonArray(root()["bufferViews"]);
   cameras = JsonArray(root()["cameras"]);
   images = JsonArray(root()["images"]);
@@ -99,7 +105,10 @@ Model::Model(const std::string& path, std::uint64_t max_bytes) : memory(max_byte
   check_extensions();
   load_buffers(glb);
   check_buffer_views();
-  check_accessors(*this);
+  for (std::size_t i = 0; i < accessor_json.size(); ++i) {
+    accessors.emplace_back(*this, accessor_json[i]);
+    accessors.back().check_sparse_order();
+  }
 }
 
 void Model::check_version() const {

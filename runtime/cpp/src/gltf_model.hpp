@@ -8,12 +8,14 @@
 #include <utility>
 #include <vector>
 
+#include "gltf_accessor.hpp"
+#include "gltf_byte_view.hpp"
 #include "gltf_files.hpp"
 #include "gltf_json.hpp"
 
 namespace ln::gltf {
 
-/// What is to be said to the user: each thing once, with the number of times it happened.
+/// What is to be said to the user: each thing once, with the number of times it happened; not more than some dozens.
 class Notes {
  public:
   void add(std::string text) { count(std::move(text), {}, 0); }
@@ -28,30 +30,7 @@ class Notes {
   };
   std::vector<Note> notes_;
   std::map<std::string, std::size_t, std::less<>> index_;
-};
-
-/// Reads bytes of a buffer. Every byte of every buffer, views, accessors and embedded images alike, is read through `load` or
-/// `part`, which throw instead of reading beyond the end.
-class ByteView {
- public:
-  ByteView() = default;
-  explicit ByteView(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
-  std::size_t size() const { return bytes_.size(); }
-
-  template <class T>
-  T load(std::size_t offset) const {
-    T value;
-    std::memcpy(&value, part(offset, sizeof(T)).data(), sizeof(T));
-    return value;
-  }
-
-  std::span<const std::uint8_t> part(std::size_t offset, std::size_t size) const {
-    if (offset > bytes_.size() || size > bytes_.size() - offset) throw Error("read beyond the end of a buffer");
-    return bytes_.subspan(offset, size);
-  }
-
- private:
-  std::span<const std::uint8_t> bytes_;
+  double left_out_ = 0;
 };
 
 struct Model {
@@ -67,7 +46,8 @@ struct Model {
   Folder folder;
   Bytes file;
   std::unique_ptr<JsonDocument> document;
-  JsonArray accessors, buffer_views, cameras, images, lights, materials, meshes, nodes, samplers, skins, textures;
+  std::vector<Accessor> accessors;
+  JsonArray buffer_views, cameras, images, lights, materials, meshes, nodes, samplers, skins, textures;
   std::vector<Bytes> buffers;
   bool quantized = false;  // KHR_mesh_quantization is declared
 

@@ -58,10 +58,12 @@ class DuplicateFinder {
     }
   }
 
+  /// Says that seen_before(triangle) will be asked soon.
+  void prefetch(std::uint32_t triangle) const { __builtin_prefetch(&slots_[hash_of(triangle) & (slots_.size() - 1)]); }
+
   /// True if a triangle with the same corners was seen before.
   bool seen_before(std::uint32_t triangle) {
-    const UVec3& t = scene_.triangles[triangle];
-    const std::uint64_t hash = mix(vertex_hashes_[t.x] + vertex_hashes_[t.y] + vertex_hashes_[t.z] + group(triangle));
+    const std::uint64_t hash = hash_of(triangle);
     const std::uint64_t entry = (hash & ~0xffffffffull) | triangle;
     const std::size_t mask = slots_.size() - 1;
     for (std::size_t at = hash & mask;; at = (at + 1) & mask) {
@@ -75,6 +77,11 @@ class DuplicateFinder {
 
  private:
   static constexpr std::uint64_t kFree = ~0ull;
+
+  std::uint64_t hash_of(std::uint32_t triangle) const {
+    const UVec3& t = scene_.triangles[triangle];
+    return mix(vertex_hashes_[t.x] + vertex_hashes_[t.y] + vertex_hashes_[t.z] + group(triangle));
+  }
 
   std::uint32_t group(std::uint32_t triangle) const { return groups_[scene_.parts[scene_.triangle_part[triangle]].material]; }
 
@@ -165,7 +172,10 @@ std::vector<bool> find_doomed(const SceneData& scene, Notes& notes) {
   for (const bool emitting : {true, false}) {
     for (const Part& part : scene.parts) {
       if (scene.materials[part.material].emits() != emitting) continue;
-      for (std::uint32_t i = part.first_triangle; i < part.first_triangle + part.triangle_count; ++i) {
+      constexpr std::uint32_t kAhead = 12;
+      const std::uint32_t end = part.first_triangle + part.triangle_count;
+      for (std::uint32_t i = part.first_triangle; i < end; ++i) {
+        if (end - i > kAhead) finder.prefetch(i + kAhead);
         if (doomed[i] || !finder.seen_before(i)) continue;
         doomed[i] = true;
         ++duplicate;

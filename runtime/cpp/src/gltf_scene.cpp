@@ -29,10 +29,11 @@ class SceneReader {
 
  private:
   void measure();
-  void read_joints();
+  void place_joints();
+  const std::vector<Affine>& joints_of(std::size_t skin);
   void visit(std::uint32_t index, const Affine& world);
   void add_mesh(Json node, const Affine& world);
-  std::vector<Affine> instances(Json node) const;
+  std::vector<Affine> instances(Json node, const Affine& world) const;
   void add_camera(const Placed& placed);
   void add_light(const Placed& placed);
   Vec3 scaled_intensity(Json light, double factor) const;
@@ -53,19 +54,21 @@ class SceneReader {
 
 /// Adds up what all meshes will need before the first one is read.
 void SceneReader::measure() {
-  std::map<std::size_t, MeshSize> sizes;
+  std::vector<MeshSize> sizes;
+  for (const Json mesh : model_.meshes) sizes.push_back(meshes_.measure(mesh));
   used_meshes_.resize(model_.meshes.size(), false);
   MeshSize total;
   forest_.walk(roots_, [&](std::uint32_t index, const Affine&) {
     const Json node = model_.nodes[index], mesh = node["mesh"];
     if (!mesh) return;
     used_meshes_[mesh.index()] = true;
-    const auto [size, is_new] = sizes.try_emplace(mesh.index());
-    if (is_new) size->second = meshes_.measure(model_.meshes[mesh.index()]);
+    const MeshSize& size = sizes[mesh.index()];
+    if (size.triangles == 0) return;
     double copies = 1;
-    for (const Json attribute : node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]) copies = model_.accessors[attribute.index()]["count"].number(1);
-    total.triangles += copies * size->second.triangles;
-    total.bytes += copies * size->second.bytes;
+    for (const Json attribute : node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]) copies = static_cast<double>(model_.accessors[attribute.index()].count());
+    total.triangles += copies * size.triangles;
+    const double parts = copies * static_cast<double>(model_.meshes[mesh.index()]["primitives"].size());
+    total.bytes += copies * (size.bytes + sizeof(Affine)) + parts * (name_and_tags_bytes(node) + name_and_tags_bytes(model_.meshes[mesh.index()]));
   });
   model_.memory.claim(total.bytes, model_.document->file() + ": the scene, with " + number_text(total.triangles) + " triangles,");
   scene_.triangles.reserve(static_cast<std::size_t>(total.triangles));
@@ -73,7 +76,7 @@ void SceneReader::measure() {
 }
 
 /// Finds where the joints of all skins are at rest.
-void SceneReader::read_joints() {
+void SceneReader::place_joints() {
   if (model_.skins.size() == 0) return;
   std::vector<bool> is_joint(model_.nodes.size(), false);
   for (const Json skin : model_.skins) {
@@ -82,37 +85,40 @@ void SceneReader::read_joints() {
   forest_.walk(forest_.roots(), [&](std::uint32_t index, const Affine& world) {
     if (is_joint[index]) joint_worlds_[index] = world;
   });
-  for (std::size_t s = 0; s < model_.skins.size(); ++s) {
-    const Json skin = model_.skins[s], inverse = skin["inverseBindMatrices"];
-    Accessor matrices;
-    if (inverse) {
-      matrices = Accessor(model_, inverse.index());
-      if (matrices.type() != "MAT4" || matrices.component_type() != ComponentType::f32) inverse.fail("must be an accessor of MAT4 of FLOAT");
-      if (matrices.count() < skin["joints"].size()) inverse.fail("has " + std::to_string(matrices.count()) + " matrices for " + std::to_string(skin["joints"].size()) + " joints");
-    }
-    std::size_t i = 0;
-    for (const Json joint : skin["joints"]) {
-      const Affine& world = joint_worlds_[static_cast<std::uint32_t>(joint.index())];
-      joints_[s].push_back(inverse ? world * make_affine(matrices.get<16>(i)) : world);
-      ++i;
-    }
-  }
 }
 
-std::vector<Affine> SceneReader::instances(Json node) const {
+/// What moves a vertex from the mesh to the world if it hangs on joint i alone: the joint's place times the inverse bind matrix.
+const std::vector<Affine>& SceneReader::joints_of(std::size_t skin_index) {
+  const auto [found, is_new] = joints_.try_emplace(skin_index);
+  if (!is_new) return found->second;
+  const Json skin = model_.skins[skin_index], inverse = skin["inverseBindMatrices"];
+  Accessor matrices;
+  if (inverse) {
+    matrices = model_.accessors[inverse.index()];
+    if (matrices.type() != "MAT4" || matrices.component_type() != ComponentType::f32) inverse.fail("must be an accessor of MAT4 of FLOAT");
+    if (matrices.count() < skin["joints"].size()) inverse.fail("has " + std::to_string(matrices.count()) + " matrices for " + std::to_string(skin["joints"].size()) + " joints");
+  }
+  for (const Json joint : skin["joints"]) {
+    const Affine& world = joint_worlds_.at(static_cast<std::uint32_t>(joint.index()));
+    found->second.push_back(inverse ? world * make_affine(matrices.get<16>(found->second.size())) : world);
+  }
+  return found->second;
+}
+
+std::vector<Affine> SceneReader::instances(Json node, const Affine& world) const {
   const Json attributes = node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"];
-  if (attributes.size() == 0) return {Affine{}};
+  if (attributes.size() == 0) return {world};
   const auto read = [&](std::string_view name, std::string_view type) {
     const Json reference = attributes[name];
     if (!reference) return Accessor();
-    Accessor accessor(model_, reference.index());
+    Accessor accessor = model_.accessors[reference.index()];
     if (accessor.type() != type) reference.fail("is an accessor of " + std::string(accessor.type()) + " where " + std::string(type) + " is wanted");
     return accessor;
   };
   const Accessor translation = read("TRANSLATION", "VEC3"), rotation = read("ROTATION", "VEC4"), scale = read("SCALE", "VEC3");
   std::size_t count = 0;
   for (const Json reference : attributes) {
-    const std::size_t n = Accessor(model_, reference.index()).count();
+    const std::size_t n = model_.accessors[reference.index()].count();
     if (count != 0 && n != count) reference.fail("has " + std::to_string(n) + " elements, another attribute has " + std::to_string(count));
     count = n;
   }
@@ -121,15 +127,15 @@ std::vector<Affine> SceneReader::instances(Json node) const {
   for (std::size_t i = 0; i < count; ++i) {
     std::array<double, 4> q = rotation ? rotation.get<4>(i) : std::array<double, 4>{0, 0, 0, 1};
     if (q == std::array<double, 4>{}) q[3] = 1;
-    transforms.push_back(make_trs(translation ? translation.vec3(i) : DVec3(0), q, scale ? scale.vec3(i) : DVec3(1)));
+    transforms.push_back(world * make_trs(translation ? translation.vec3(i) : DVec3(0), q, scale ? scale.vec3(i) : DVec3(1)));
   }
   return transforms;
 }
 
 void SceneReader::add_mesh(Json node, const Affine& world) {
   const Json skin = node["skin"];
-  const std::vector<Affine>* joints = skin ? &joints_.at(skin.index()) : nullptr;
-  for (const Affine& instance : instances(node)) meshes_.add({node, model_.meshes[node["mesh"].index()], world * instance, joints});
+  const std::vector<Affine>* joints = skin ? &joints_of(skin.index()) : nullptr;
+  meshes_.add({node, model_.meshes[node["mesh"].index()], instances(node, world), joints});
 }
 
 void SceneReader::visit(std::uint32_t index, const Affine& world) {
@@ -154,15 +160,17 @@ bool is_finite_position(const Vec3& p) { return std::isfinite(p.x) && std::isfin
 void SceneReader::add_camera(const Placed& placed) {
   const Json node = model_.nodes[placed.node], json = model_.cameras[node["camera"].index()];
   Camera camera;
-  camera.name = json["name"].text();
-  camera.node = node["name"].text();
+  camera.name = read_name(json);
+  camera.node = read_name(node);
   camera.position = normalised_(placed.world.translation);
 
   // It looks along -z with y up; scale and shear of the node do not concern it.
   const DVec3 forward = direction(-placed.world.linear[2]), y = placed.world.linear[1];
   const DVec3 up = direction(direction(y) - forward * glm::dot(forward, direction(y)));
   const DVec3 right = direction(glm::cross(forward, up));
-  if (!is_finite_position(camera.position) || right == DVec3(0)) return model_.notes.add("the camera at " + node.path() + " is ignored: its transform is singular or not finite");
+  if (!is_finite_position(camera.position) || right == DVec3(0)) {
+    return model_.notes.count("camera is ignored: its transform is singular or not finite", "cameras are ignored: their transforms are singular or not finite", 1);
+  }
   camera.forward = Vec3(forward);
   camera.up = Vec3(up);
   camera.right = Vec3(right);
@@ -198,15 +206,15 @@ void SceneReader::add_light(const Placed& placed) {
   const std::string_view type = json["type"].text();
   PunctualLight light;
   light.kind = type == "point" ? PunctualKind::point : type == "spot" ? PunctualKind::spot : PunctualKind::directional;
-  light.name = json["name"].text();
-  light.node = node["name"].text();
+  light.name = read_name(json);
+  light.node = read_name(node);
   read_tags(node, light.tags);
   read_tags(json, light.tags);
   light.position = normalised_(placed.world.translation);
   const DVec3 shines = direction(-placed.world.linear[2]);
   const bool needs_direction = light.kind != PunctualKind::point, needs_position = light.kind != PunctualKind::directional;
   if ((needs_direction && shines == DVec3(0)) || (needs_position && !is_finite_position(light.position))) {
-    return model_.notes.add("the light at " + node.path() + " is ignored: its transform is singular or not finite");
+    return model_.notes.count("light is ignored: its transform is singular or not finite", "lights are ignored: their transforms are singular or not finite", 1);
   }
   if (!needs_position) light.position = Vec3(0);
   if (needs_direction) light.direction = Vec3(shines);
@@ -226,7 +234,7 @@ void SceneReader::add_light(const Placed& placed) {
 
 SceneData SceneReader::read() {
   measure();
-  read_joints();
+  place_joints();
   forest_.walk(roots_, [&](std::uint32_t index, const Affine& world) { visit(index, world); });
   normalised_ = normalise_geometry(scene_, std::move(meshes_.world()), model_.notes);
   for (std::size_t i = 0; i < used_meshes_.size(); ++i) {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 
 namespace ln {
@@ -55,6 +56,8 @@ std::string printable(std::string_view text, std::size_t max_bytes) {
 }
 
 std::string number_text(double value) {
+  constexpr double kPlain = 1e15;  // below, integers are written without exponent
+  if (value == std::trunc(value) && std::abs(value) < kPlain) return std::to_string(static_cast<long long>(value));
   std::array<char, 32> buffer;
   const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
   return {buffer.data(), end};

@@ -110,13 +110,12 @@ Bsdf::Bsdf(const BsdfParameters& p, bool outside, const DielectricTable* table) 
   if (transmission_ > 0) {
     wall_ = p.solid ? Wall::solid : Wall::thin;
     tint_ = transmission_ * base;
-    eta_ = ior;
+    ior_ = ior;
     coating_ = unit(specular * specular_color);
     if (wall_ == Wall::solid) {
-      if (rough_ && std::abs(std::log(eta_)) < std::log(kMinBend)) eta_ = eta_ < 1 ? 1 / kMinBend : kMinBend;
-      const float n2 = eta_ * eta_;
-      const float front_average = eta_ > 1 ? fresnel_average(eta_) : 1 - (1 - fresnel_average(1 / eta_)) * n2;
-      if (!outside) eta_ = 1 / eta_;
+      if (rough_ && ior_ > 1 / kMinBend && ior_ < kMinBend) ior_ = ior_ < 1 ? 1 / kMinBend : kMinBend;
+      const float n2 = ior_ * ior_;
+      const float front_average = ior_ > 1 ? fresnel_average(ior_) : 1 - (1 - fresnel_average(1 / ior_)) * n2;
       table_ = rough_ ? table : nullptr;
       if (table_) {
         // Reciprocity ties the two directions: (share transmitted * average deficit * index^2) must be the same from
@@ -133,10 +132,11 @@ Bsdf::Bsdf(const BsdfParameters& p, bool outside, const DielectricTable* table) 
         }
       }
     } else if (rough_) {
-      const Color returned = slab_reflectance(coating_ * fresnel_average(std::max(eta_, 1.0f)));
+      const Color returned = slab_reflectance(coating_ * fresnel_average(std::max(ior_, 1.0f)));
       multiple_up_ += transmission_ * returned;
       multiple_down_ = tint_ * (1.0f - returned);
     }
+    eta_ = wall_ == Wall::thin || outside ? ior_ : 1 / ior_;
   }
 
   if (!is_black(diffuse_)) events_ = events_ | Events::D;
@@ -157,12 +157,15 @@ Color Bsdf::solid_deficit(float cosine, bool side_of_wo) const {
   return d.x + coating_ * (d.y - d.x);
 }
 
-Bsdf::Interface Bsdf::at_interface(float cosine) const {
+Bsdf::Interface Bsdf::at_interface(float cosine, float eta) const {
   if (wall_ == Wall::opaque) return {Color(0), Color(0), 0};
-  const Fresnel fresnel = fresnel_dielectric(cosine, eta_);
-  Color r = fresnel.total ? Color(1) : coating_ * fresnel.reflectance;
-  if (wall_ == Wall::thin) r = slab_reflectance(r);
-  return {transmission_ * r, tint_ * (1.0f - r), fresnel.cos_t};
+  const Fresnel fresnel = fresnel_dielectric(cosine, eta);
+  // A coating reduces the reflection of an interface that transmits; it cannot undo total internal reflection.
+  const bool total = fresnel.transmittance == 0;
+  Color r = total ? Color(1) : coating_ * fresnel.reflectance;
+  Color t = total ? Color(0) : fresnel.transmittance + (1.0f - coating_) * fresnel.reflectance;
+  if (wall_ == Wall::thin) r = slab_reflectance(r), t = slab_transmittance(t);
+  return {transmission_ * r, tint_ * t, fresnel.cos_t};
 }
 
 Bsdf::View Bsdf::view(const Vec3& wo, Events mask) const {
@@ -175,7 +178,7 @@ Bsdf::View Bsdf::view(const Vec3& wo, Events mask) const {
     const FacetAlbedo& f = v.facets;
     facet = mean_component(facet_f0_) * (1 - f.deficit - f.schlick) + facet_f90_ * f.schlick;
     if (wall_ != Wall::opaque) {
-      const Interface i = at_interface(wo.z);
+      const Interface i = at_interface(wo.z, eta_);
       facet += mean_component(i.reflected + i.transmitted);
     }
     if (rough_) {
@@ -216,9 +219,9 @@ BsdfValue Bsdf::evaluate_smooth(const View& v, const Vec3& wo, const Vec3& wi, E
 
     const Ggx ggx(alpha_);
     const Vec3 h = wo + wi;
-    const float om = glm::dot(wo, h) / glm::length(h);
+    const float om = 0.5f * glm::length(h);  // = wo.h / |h|, but the same for wo and wi exchanged
     const float density = ggx.density(h);
-    const Interface interface = at_interface(om);
+    const Interface interface = at_interface(om, eta_);
     const Color facet = facet_f0_ + (facet_f90_ - facet_f0_) * schlick_weight(om);
     if (kValue) {
       result.f_cos += (facet + interface.reflected) * (density * Ggx::visibility(wo.z, v.reach, wi.z, ggx.reach(wi.z)) * wi.z);
@@ -238,9 +241,9 @@ BsdfValue Bsdf::evaluate_smooth(const View& v, const Vec3& wo, const Vec3& wi, E
   if (wall_ == Wall::thin) {
     // A reflection whose direction passes to the other side.
     const Vec3 h = wo + Vec3(wi.x, wi.y, z_i);
-    const float om = glm::dot(wo, h) / glm::length(h);
+    const float om = 0.5f * glm::length(h);  // = wo.h / |h|, but the same for wo and wi exchanged
     const float density = ggx.density(h);
-    const Interface interface = at_interface(om);
+    const Interface interface = at_interface(om, eta_);
     if (kValue) {
       result.f_cos = interface.transmitted * (density * Ggx::visibility(wo.z, v.reach, z_i, ggx.reach(z_i)) * z_i);
       result.f_cos += multiple_down_ * (multiple_norm_ * v.facets.deficit * facets(z_i).deficit * z_i);
@@ -253,23 +256,29 @@ BsdfValue Bsdf::evaluate_smooth(const View& v, const Vec3& wo, const Vec3& wi, E
     return result;
   }
 
-  // Refraction (Walter et al. 2007, eqs. 16, 17, 21), with eta relative to the side of wo.
-  const float to_radiance = carried == Carried::radiance ? 1 / (eta_ * eta_) : 1;
-  Vec3 h = wo + eta_ * wi;
-  if (h.z < 0) h = -h;
-  const float hh = glm::dot(h, h);
-  const float oh = glm::dot(wo, h), ih = -glm::dot(wi, h);
+  // Refraction (Walter et al. 2007, eqs. 16, 17, 21). Half vector, cosine and Fresnel term are computed as from outside
+  // on either side, so that rounding is reciprocal, too.
+  const bool radiance = carried == Carried::radiance;
+  const float n2 = ior_ * ior_;
+  const Vec3 h = outside_ ? wo + ior_ * wi : wi + ior_ * wo;
+  const float side = h.z < 0 ? -1.0f : 1.0f;
+  const float oh = side * glm::dot(wo, h), ih = -side * glm::dot(wi, h);
   if (oh > 0 && ih > 0) {
-    // |h|^2 is the square of the denominator (eta wi.m + wo.m); the other factors of |h| are those of m = h / |h|.
-    const Interface interface = at_interface(oh / std::sqrt(hh));
-    const float jacobian = eta_ * eta_ * ih * oh / (hh * hh);  // times wo.m
-    const float visible = ggx.density(h) * 2 / (wo.z + v.reach) * jacobian;
-    if (kValue) result.f_cos = interface.transmitted * (visible * Ggx::masking(z_i, ggx.reach(z_i)) * to_radiance);
+    const float hh = glm::dot(h, h);
+    const float cosine_outside = (outside_ ? oh : ih) / std::sqrt(hh);
+    const Interface interface = at_interface(cosine_outside, ior_);
+    const float core = ggx.density(h) * oh * ih / (hh * hh);
+    if (kValue) {
+      const float masking = Ggx::masking(wo.z, v.reach) * Ggx::masking(z_i, ggx.reach(z_i));
+      result.f_cos = interface.transmitted * (core * masking / wo.z * (outside_ != radiance ? n2 : 1));
+    }
     if (kDensity) {
       const Color facet = facet_f0_ + (facet_f90_ - facet_f0_) * schlick_weight(oh / std::sqrt(hh));
-      result.pdf_w = v.p_facet * (1 - interface.reflection_probability(facet)) * visible;
+      const float p = v.p_facet * (1 - interface.reflection_probability(facet));
+      result.pdf_w = p * core * 2 / (wo.z + v.reach) * (outside_ ? n2 : 1);
     }
   }
+  const float to_radiance = radiance ? 1 / (eta_ * eta_) : 1;
   if (table_) {
     if (kValue) result.f_cos += multiple_down_ * v.solid_deficit * solid_deficit(z_i, false) * (z_i * to_radiance);
     if (kDensity) result.pdf_w += v.p_multiple_down * Grazing(alpha_).pdf_w(z_i);
@@ -301,7 +310,7 @@ bool Bsdf::layered_sample(const Vec3& wo, float u_lobe, const Vec2& u, Events ma
     const Vec3 m = rough_ ? Ggx(alpha_).sample_visible(wo, u, v.cap_share) : Vec3(0, 0, 1);
     const float om = glm::dot(wo, m);
     if (!(om > 0)) return false;
-    const Interface interface = at_interface(om);
+    const Interface interface = at_interface(om, eta_);
     const Color facet = facet_f0_ + (facet_f90_ - facet_f0_) * schlick_weight(om);
     const float p_reflection = interface.reflection_probability(facet);
     const bool reflects = u_lobe < p_reflection || p_reflection == 1;
@@ -344,7 +353,7 @@ Color Bsdf::layered_albedo(const Vec3& wo, Events mask) const {
   if (!any(mask & events_ & (Events::G | Events::S))) return sum;
   sum += facet_f0_ * (1 - f.deficit - f.schlick) + facet_f90_ * f.schlick + multiple_up_ * f.deficit;
   if (wall_ == Wall::opaque) return sum;
-  const Interface i = at_interface(wo.z);
+  const Interface i = at_interface(wo.z, eta_);
   const Color once = i.reflected + i.transmitted;
   if (wall_ == Wall::thin) return sum + once * (1 - f.deficit) + multiple_down_ * f.deficit;
   if (!table_) return sum + once;

@@ -136,7 +136,7 @@ class Bsdf {
   template <bool kValue, bool kDensity>
   BsdfValue evaluate_smooth(const View& view, const Vec3& wo, const Vec3& wi, Events mask, Carried carried) const;
   View view(const Vec3& wo, Events mask) const;
-  Interface at_interface(float cosine) const;
+  Interface at_interface(float cosine, float eta) const;
   FacetAlbedo facets(float cosine) const;
   Color below_layer(const FacetAlbedo& facets) const;
   Color solid_deficit(float cosine, bool side_of_wo) const;
@@ -159,7 +159,8 @@ class Bsdf {
   float multiple_norm_ = 0;   // 1 / (pi average deficit)
   // Transmission.
   float transmission_ = 0;    // share
-  float eta_ = 1;             // index on the other side over the index on the side of wo; thin: of the wall over that of air
+  float ior_ = 1;             // index inside over the index outside
+  float eta_ = 1;             // index on the other side over the index on the side of wo; thin: as from outside
   Color tint_{0};             // share * base colour
   Color coating_{1};          // factor of the dielectric's reflectance (KHR_materials_specular)
   Color multiple_down_{0};    // transmitted after several bounces; thin: per deficit; solid: per deficit at wo and at wi

@@ -21,26 +21,28 @@ inline float normal_reflectance(float ior) { return ior > 0 ? sqr((ior - 1) / (i
 
 /// What an ideal dielectric interface does to unpolarised light.
 struct Fresnel {
-  float reflectance;  // 1 under total internal reflection
-  float cos_t;        // cosine of the refracted direction, 0 under total internal reflection
-  bool total;         // total internal reflection
+  float reflectance;    // 1 under total internal reflection
+  float transmittance;  // 1 - reflectance, without cancellation
+  float cos_t;          // cosine of the refracted direction, 0 under total internal reflection
 };
 
 /// Fresnel's equations; `eta` > 0.
 inline Fresnel fresnel_dielectric(float cos_i, float eta) {
   // cos_t^2 without cancellation near eta = 1 and at grazing angles.
   const float cos2_t = ((eta - 1) * (eta + 1) + cos_i * cos_i) / (eta * eta);
-  if (!(cos2_t > 0)) return {1, 0, true};
+  if (!(cos2_t > 0)) return {1, 0, 0};
   const float cos_t = std::sqrt(cos2_t);
-  const float s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
-  const float p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
-  return {0.5f * (s * s + p * p), cos_t, false};
+  const float s = cos_i + eta * cos_t, p = eta * cos_i + cos_t;
+  const float product = 2 * eta * cos_i * cos_t;
+  const float transmittance = product * (1 / (s * s) + 1 / (p * p));
+  return {0.5f * (sqr((cos_i - eta * cos_t) / s) + sqr((eta * cos_i - cos_t) / p)), transmittance, cos_t};
 }
 
 /// Cosine-weighted average of the reflectance over the hemisphere in front of a denser medium (fit of Kulla and Conty 2017, error < 0.1 %).
 inline float fresnel_average(float eta) { return (eta - 1) / (4.08567f + 1.00071f * eta); }
 
-/// Reflectance of a thin slab from that of one of its faces: R + T^2 R (1 + R^2 + R^4 + ...) with T = 1 - R.
+/// What a thin slab does, given what one of its faces reflects and transmits: R + T^2 R (1 + R^2 + R^4 + ...), and the rest.
 inline Color slab_reflectance(const Color& face) { return 2.0f * face / (1.0f + face); }
+inline Color slab_transmittance(const Color& face_transmittance) { return face_transmittance / (2.0f - face_transmittance); }
 
 }  // namespace ln

@@ -14,10 +14,10 @@ from lnc.graph import strong_components
 from lnc.network import Network
 from lnc.passes.check_cycles import wire_sources
 
-CHARACTER = 6.7  # width of one in the label font
+CHARACTER = 7.2  # width of one in the label font, bold
 ROW = 15
 GAP_X, GAP_Y, MARGIN = 70, 26, 20
-IMAGE = "image"
+BEND = "bend"
 
 STYLE = """
     text { font: 12px ui-sans-serif, Helvetica, Arial, sans-serif; fill: #222 }
@@ -37,14 +37,12 @@ class _Box:
     layer: int = 0
     x: float = 0
     y: float = 0
+    width: float = 0
+    height: float = 0
 
-    @property
-    def width(self) -> float:
-        return max(len(text) for _, text in self.lines) * CHARACTER + 20
-
-    @property
-    def height(self) -> float:
-        return len(self.lines) * ROW + 14
+    def __post_init__(self) -> None:
+        self.width = max((len(text) for _, text in self.lines), default=-1) * CHARACTER + 20
+        self.height = len(self.lines) * ROW + 14
 
 
 def draw(result: Result) -> str:
@@ -52,7 +50,9 @@ def draw(result: Result) -> str:
     assert result.typed is not None
     network = result.typed.network
     boxes = _boxes(result)
+    pushed = {(t.node, n.name) for n in network.nodes for i in n.inputs if i.port.complete for t in i.terms}
     back = _layers(boxes)
+    _bend_long_wires(boxes, back)
     _place(boxes)
     width = max((b.x + b.width for b in boxes.values()), default=0) + MARGIN
     height = max((b.y + b.height for b in boxes.values()), default=0) + MARGIN + (40 if back else 0)
@@ -61,11 +61,11 @@ def draw(result: Result) -> str:
         f'width="{width:.0f}" height="{height:.0f}">',
         f"<title>{escape(network.name)}</title>",
         f"<style>{STYLE}</style>",
-        '<defs><marker id="arrow" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="8" markerHeight="8" orient="auto">'
+        '<defs><marker id="arrow" viewBox="0 0 8 8" refX="8" refY="4" markerWidth="9" markerHeight="9" '
+        'markerUnits="userSpaceOnUse" orient="auto">'
         '<path d="M0 0 L8 4 L0 8 z"/></marker></defs>',
         f'<rect x="0" y="0" width="{width:.0f}" height="{height:.0f}" style="fill:#fff;stroke:none"/>',
     ]
-    pushed = {(t.node, n.name) for n in network.nodes for i in n.inputs if i.port.complete for t in i.terms}
     for box in boxes.values():
         parts += [_wire(boxes[s], box, (s, box.name) in back, (s, box.name) in pushed, height) for s in box.reads]
     parts += [_box(box) for box in boxes.values()]
@@ -108,6 +108,21 @@ def _layers(boxes: dict[str, _Box]) -> set[tuple[str, str]]:
     return back
 
 
+def _bend_long_wires(boxes: dict[str, _Box], back: set[tuple[str, str]]) -> None:
+    """A wire that passes layers gets a place of its own in each, so that it does not run behind boxes."""
+    for box in list(boxes.values()):
+        reads: list[str] = []
+        for source in box.reads:
+            through = source
+            if (source, box.name) not in back:
+                for layer in range(boxes[source].layer + 1, box.layer):
+                    name = f"{source}\0{box.name}\0{layer}"
+                    boxes[name] = _Box(name, [], [through], BEND, layer)
+                    through = name
+            reads.append(through)
+        box.reads = reads
+
+
 def _place(boxes: dict[str, _Box]) -> None:
     columns: dict[int, list[_Box]] = {}
     for box in boxes.values():
@@ -125,7 +140,10 @@ def _place(boxes: dict[str, _Box]) -> None:
         for box in column:
             box.x, box.y = x, max(y, height(box) - box.height / 2)
             y = box.y + box.height + GAP_Y
-        x += max(box.width for box in column) + GAP_X
+        width = max(box.width for box in column)
+        for box in column:
+            box.width = width if box.kind == BEND else box.width
+        x += width + GAP_X
 
 
 def _box(box: _Box) -> str:
@@ -133,6 +151,9 @@ def _box(box: _Box) -> str:
         f'<text x="{box.x + 10:.0f}" y="{box.y + 19 + i * ROW:.0f}" class="{kind}">{escape(text)}</text>'
         for i, (kind, text) in enumerate(box.lines)
     ]
+    if box.kind == BEND:
+        middle = box.y + box.height / 2
+        return f'<path d="M{box.x:.0f} {middle:.0f} L{box.x + box.width:.0f} {middle:.0f}"/>'
     frame = f'<rect x="{box.x:.0f}" y="{box.y:.0f}" width="{box.width:.0f}" height="{box.height:.0f}"/>'
     return f'<g class="{box.kind}">{frame}{"".join(lines)}</g>'
 
@@ -151,7 +172,8 @@ def _wire(source: _Box, target: _Box, back: bool, push: bool, bottom: float) -> 
     else:
         bend = max(30.0, (x1 - x0) / 2)
         data = f"M{x0:.0f} {y0:.0f} C{x0 + bend:.0f} {y0:.0f} {x1 - bend:.0f} {y1:.0f} {x1:.0f} {y1:.0f}"
-    return f'<path class="{kinds}" d="{data}" marker-end="url(#arrow)"/>'
+    arrow = "" if target.kind == BEND else ' marker-end="url(#arrow)"'
+    return f'<path class="{kinds}" d="{data}"{arrow}/>'
 
 
 def _short(text: str) -> str:

@@ -21,6 +21,7 @@ from lnc.library import (
     snake_case,
 )
 from lnc.locations import cached, compiler_fingerprint, library_folders
+from lnc.paths.language import EMITTERS
 from lnc.source import SourceFile, Span
 from lnc.syntax import ast
 from lnc.syntax.parse import parse
@@ -179,14 +180,17 @@ class _OperatorReader:
             if rest:
                 tail = ast.PathConcat(rest, item.span) if len(rest) > 1 else rest[0]
             if isinstance(head, ast.PathName) and head.name in names:
-                emitter = head.tag.name if head.tag else None
-                rules.append(PathRule(item.content, head.name, emitter, tail))
+                rules.append(PathRule(item.content, head.name, head.tag.name if head.tag else None, tail))
             elif isinstance(head, ast.PathEvents) and head.letters == "L":
                 rules.append(PathRule(item.content, None, head.tag.name if head.tag else None, tail))
             else:
                 self._error(path.span, "light paths begin with a port or with L")
                 continue
             self._check_tail(tail, parameters)
+            tags = {p.name for p in parameters if p.type == "tags"}
+            emitter = rules[-1].emitter
+            if emitter is not None and emitter not in (*EMITTERS, *tags):
+                self._error(path.span, f"'@{emitter}' is neither area nor delta nor a tags parameter")
         return rules
 
     def _check_tail(self, tail: ast.PathExpression | None, parameters: tuple[Parameter, ...]) -> None:

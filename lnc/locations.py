@@ -15,6 +15,7 @@ import lnc
 
 T = TypeVar("T")
 
+KEPT = 16  # cache files of one kind
 _PACKAGE = Path(__file__).resolve().parent
 
 
@@ -80,6 +81,14 @@ def cached(kind: str, key: str, make: Callable[[], T]) -> T:
     return value
 
 
+def _prune(path: Path) -> None:
+    """Keep the newest few files of a kind."""
+    kind = path.name.split("-")[0]
+    files = sorted(path.parent.glob(f"{kind}-*.pickle"), key=lambda file: file.stat().st_mtime, reverse=True)
+    for old in files[KEPT:]:
+        old.unlink(missing_ok=True)
+
+
 def _read_trusted(path: Path) -> bytes | None:
     try:
         with path.open("rb") as file:
@@ -101,6 +110,7 @@ def _write_atomically(path: Path, payload: bytes) -> None:
         with os.fdopen(descriptor, "wb") as file:
             file.write(hashlib.sha256(payload).digest() + payload)
         os.replace(temporary, path)
+        _prune(path)
     except OSError:
         with suppress(OSError):
             temporary.unlink()

@@ -61,6 +61,11 @@ class Reporter:
             self.diagnostics.append(diagnostic)
 
     @property
+    def full(self) -> bool:
+        """No further message will be kept."""
+        return len(self.diagnostics) >= self.limit
+
+    @property
     def failed(self) -> bool:
         return any(d.severity == "error" for d in self.diagnostics)
 

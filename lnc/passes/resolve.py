@@ -150,6 +150,7 @@ class _Resolver:
     def _alias(self, equation: ast.Equation) -> None:
         """A second name for a wire: no node, but its end must exist and must not be itself."""
         if isinstance(equation.wire, ast.WireName):
+            self.used.add(equation.wire.name)
             if equation.wire.name not in self.equations:
                 self._unknown_wire(equation.wire)
             elif self._alias_end(equation.name) is None and equation.name in self.circular:

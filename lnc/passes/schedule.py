@@ -11,7 +11,9 @@ from __future__ import annotations
 from lnc.graph import strong_components
 from lnc.network import Network, Node, Schedule, ScheduledInput, ScheduledNode
 from lnc.passes.check_cycles import wire_sources
+from lnc.source import Span
 
+TEXT_LIMIT = 400
 CPP_WORDS = frozenset(
     """alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t char32_t class
     compl concept const consteval constexpr constinit const_cast continue co_await co_return co_yield decltype
@@ -82,8 +84,14 @@ def _scheduled(
         reason=node.reason,
         file=node.statement.source.name,
         line=node.statement.line,
-        text=" ".join(node.statement.text.split()),
+        text=_first_line(node.statement),
     )
+
+
+def _first_line(statement: Span) -> str:
+    """The statement on one line, cut where it gets long."""
+    text = statement.source.text[statement.start : min(statement.end, statement.start + TEXT_LIMIT)]
+    return " ".join(text.split()) + ("..." if statement.end - statement.start > TEXT_LIMIT else "")
 
 
 def _identifiers(names: list[str]) -> dict[str, str]:

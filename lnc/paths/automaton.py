@@ -42,10 +42,10 @@ class Nfa:
 class Dfa:
     """A trimmed, minimal, deterministic automaton; state 0 is the start, and no state is a dead end.
 
-    The empty language is one state that does not accept. `edges[state]` maps targets to letter sets, by target.
+    The empty language is one state that does not accept. Equal languages have equal automata.
     """
 
-    edges: tuple[tuple[tuple[int, int], ...], ...]  # state -> (letters, target)
+    edges: tuple[tuple[tuple[int, int], ...], ...]  # state -> (letters, target), by the lowest letter
     accepting: tuple[bool, ...]
 
     @property
@@ -142,7 +142,8 @@ def letter_blocks(masks: Iterable[int]) -> list[int]:
 
 
 def _minimise(rows: list[list[int]], accepting: list[bool], blocks: list[int]) -> Dfa:
-    """Moore's partition refinement on the states that lead somewhere, renumbered in breadth-first order."""
+    """Moore's partition refinement on the states that lead somewhere, renumbered breadth-first by letters:
+    two automata of one language come out equal."""
     useful = _co_reachable(rows, accepting)
     if 0 not in useful:
         return Dfa(((),), (False,))
@@ -163,16 +164,17 @@ def _minimise(rows: list[list[int]], accepting: list[bool], blocks: list[int]) -
     queue = [0]
     edges: list[tuple[tuple[int, int], ...]] = []
     for state in queue:
-        merged: dict[int, int] = {}
+        merged: dict[int, tuple[int, int]] = {}  # class -> letters, a state of it
         for block, target in zip(blocks, rows[state], strict=True):
-            if target < 0:
-                continue
+            if target >= 0:
+                merged[part[target]] = (merged.get(part[target], (0, 0))[0] | block, target)
+        row: list[tuple[int, int]] = []
+        for letters, target in sorted(merged.values(), key=lambda m: m[0] & -m[0]):
             if part[target] not in number:
                 number[part[target]] = len(queue)
                 queue.append(target)
-            to = number[part[target]]
-            merged[to] = merged.get(to, 0) | block
-        edges.append(tuple((mask, to) for to, mask in sorted(merged.items())))
+            row.append((letters, number[part[target]]))
+        edges.append(tuple(row))
     return Dfa(tuple(edges), tuple(accepting[s] for s in queue))
 
 

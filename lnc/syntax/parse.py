@@ -65,7 +65,7 @@ class _Parser:
         self.stack = _Stack(tables.start)
 
     def run(self) -> File:
-        saved, saved_at, braces = self.stack.copy(), 0, 0
+        saved, saved_at = self.stack.copy(), 0
         at = 0
         while True:
             token = self.tokens[at]
@@ -73,7 +73,6 @@ class _Parser:
             if self._feed(kind, token):
                 if kind == END:
                     return self.stack.values[0]  # type: ignore[no-any-return]
-                braces += (token.text == "{") - (token.text == "}")
                 at += 1
                 if kind == NEWLINE:
                     saved, saved_at = self.stack.copy(), at
@@ -81,7 +80,7 @@ class _Parser:
             self._report(at, saved_at)
             self.broken.add(defined_name(self.tokens[saved_at : saved_at + 2]) or "")
             self.stack = saved.copy()
-            at, braces = self._skip(saved_at, at, braces)
+            at = self._skip(saved_at, at)
             if self.tokens[at].type == END and not self._accepts(END):
                 self._close_blocks()
             saved, saved_at = self.stack.copy(), at
@@ -165,24 +164,24 @@ class _Parser:
 
     # --- After a mistake ----------------------------------------------------------------------------------------------
 
-    def _skip(self, saved_at: int, at: int, braces: int) -> tuple[int, int]:
+    def _skip(self, saved_at: int, at: int) -> int:
         """The start of the next statement. The rest of a block whose head is wrong goes with it."""
         depth = 0
         for token in self.tokens[saved_at:at]:
             depth += (token.text == "{") - (token.text == "}")
-        braces -= depth
         while self.tokens[at].type != END:
             token = self.tokens[at]
-            if token.text == "}":
-                depth -= 1
-                if depth < 0:
-                    return at, braces
-            elif token.text == "{":
+            if token.text == "{":
                 depth += 1
+            elif token.text == "}":
+                depth -= 1
+                if depth < 0 and self._accepts("RBRACE"):
+                    return at
+                depth = max(depth, 0)
             elif token.type == NEWLINE and depth <= 0:
-                return at + 1, braces
+                return at + 1
             at += 1
-        return at, braces
+        return at
 
     def _close_blocks(self) -> None:
         """At the end of a text with an open block: close it, so that the rest of the tree survives."""
@@ -194,6 +193,8 @@ class _Parser:
     # --- What to say --------------------------------------------------------------------------------------------------
 
     def _report(self, at: int, statement_at: int) -> None:
+        if self.reporter.full:
+            return
         token = self.tokens[at]
         end = max(token.end, token.start + 1)
         span = Span(self.source, token.start, min(end, len(self.source.text)) if token.type != END else token.end)

@@ -27,7 +27,7 @@ from lnc.syntax import ast
 from lnc.syntax.parse import parse
 
 SIZE_LIMIT = 256 * 1024
-STAGES = ("parse", "resolve", "typecheck", "insert_converters", "schedule")
+STAGES = ("parse", "expand_macros", "insert_converters", "schedule")
 
 Dump = Callable[[str, str], None]
 """Called with the name of a stage and its result as text."""
@@ -93,6 +93,7 @@ def compile_network(source: SourceFile, library: Library, dump: Dump | None = No
     _dump_text(dump, "parse", file)
     expanded = expand_macros(file, set(library.operators), _read_used, reporter)
     file = expanded.file
+    _dump_text(dump, "expand_macros", file)
     network = resolve(file, _default_name(source.name), library, reporter, expanded.broken | file.broken)
 
     def result(typed: TypedNetwork | None, found: dict[str, tuple[str, ...]], plan: Schedule | None) -> Result:

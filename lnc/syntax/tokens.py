@@ -81,7 +81,12 @@ class Tokens:
                 lines.append("")
             else:
                 blank = True
-        return lines, blank
+        return lines, blank and not self._opens(start)
+
+    def _opens(self, start: int) -> bool:
+        """Whether a token is the first of the file or of a block."""
+        index = bisect_left(self._starts, start)
+        return index == 0 or self.source.text[self._ends[index - 1] - 1] == "{"
 
     def trailing(self, end: int) -> str:
         """The comment behind a token, on its line."""

@@ -67,18 +67,16 @@ TEST_CASE("surfaces emit uniformly over their area and by the cosine, on their b
       const Vec3 n = glm::normalize(glm::cross(e1, e2));
       constexpr int kCells = 8, kCount = 100000;
       std::vector<double> place(kCells * kCells), expected_place(kCells * kCells), angle(20), expected_angle(20);
-      int back = 0;
+      int back = 0, wrong = 0;
       Random random(2);
       for (int i = 0; i < kCount; ++i) {
         const PhotonEmission photon = emitters.emit(random(), random.square(), random.square());
-        CHECK(!photon.delta);
-        CHECK(!photon.distant);
-        CHECK(photon.triangle == 0);
-        CHECK(glm::length(photon.direction) == doctest::Approx(1).epsilon(1e-5));
         const float cosine = glm::dot(photon.direction, n);
-        CHECK(std::abs(cosine) == doctest::Approx(photon.cos_theta).epsilon(1e-4).scale(1));
         if (cosine < 0) ++back;
-        CHECK(photon.flux.x == doctest::Approx(emitters.total_power().x).epsilon(1e-5));
+        const bool right = !photon.delta && !photon.distant && photon.triangle == 0 && std::abs(glm::length(photon.direction) - 1) < 1e-5f &&
+                           std::abs(std::abs(cosine) - photon.cos_theta) < 1e-4f &&
+                           std::abs(photon.flux.x / emitters.total_power().x - 1) < 1e-5f;
+        wrong += right ? 0 : 1;
         angle[static_cast<std::size_t>(std::min(static_cast<int>(sqr(photon.cos_theta) * 20), 19))] += 1;
         const DVec3 d = DVec3(photon.position.p) - DVec3(a), c = glm::cross(DVec3(e1), DVec3(e2));
         const double s = glm::dot(glm::cross(d, DVec3(e2)), c) / glm::dot(c, c), t = glm::dot(glm::cross(DVec3(e1), d), c) / glm::dot(c, c);
@@ -96,6 +94,7 @@ TEST_CASE("surfaces emit uniformly over their area and by the cosine, on their b
           }
         }
       }
+      CHECK(wrong == 0);
       CHECK(chi_square_accepts(place, expected_place));
       std::fill(expected_angle.begin(), expected_angle.end(), kCount / 20.0);
       CHECK(chi_square_accepts(angle, expected_angle));
@@ -138,17 +137,19 @@ TEST_CASE("distant light fills the bounding sphere's disk and carries the right 
     Random random(4);
     constexpr int kCount = 400000;
     double flux = 0;
+    int wrong = 0;
     for (int i = 0; i < kCount; ++i) {
       const PhotonEmission photon = emitters.emit(random(), random.square(), random.square());
-      CHECK(photon.distant);
-      CHECK(photon.delta == !environment);
       // All of the scene is ahead.
-      for (const Vec3& p : scene.data.positions) CHECK(glm::dot(p - photon.position.p, photon.direction) > 0);
+      bool right = photon.distant && photon.delta == !environment;
+      for (const Vec3& p : scene.data.positions) right = right && glm::dot(p - photon.position.p, photon.direction) > 0;
+      wrong += right ? 0 : 1;
       // Flux through a small square in the plane z = 0, downwards.
       if (photon.direction.z >= 0) continue;
       const Vec3 at = photon.position.p - photon.direction * (photon.position.p.z / photon.direction.z);
       if (std::abs(at.x) < 0.1f && std::abs(at.y) < 0.1f) flux += static_cast<double>(photon.flux.x) / kCount;
     }
+    CHECK(wrong == 0);
     const double exact = environment ? kPi : 2 * 3 / std::sqrt(14.0);
     CHECK(flux / 0.04 == doctest::Approx(exact).epsilon(0.015));
   }

@@ -113,12 +113,8 @@ TEST_CASE("extreme random numbers and receivers give points on the light or noth
     for (const float x : edges) {
       for (const float y : edges) {
         const AreaSample s = sample_solid_angle(light, p, height, {x, y});
-        CHECK(s.pdf_w >= 0);
-        CHECK(s.s >= 0);
-        CHECK(s.t >= 0);
-        CHECK(s.s <= 1);
-        CHECK(s.t <= 1);
-        if (!light.quad) CHECK(s.s + s.t <= 1.00001f);
+        const bool inside = s.s >= 0 && s.t >= 0 && s.s <= 1 && s.t <= 1 && (light.quad || s.s + s.t <= 1.00001f);
+        CHECK((s.pdf_w >= 0 && inside));
       }
     }
   }
@@ -128,24 +124,27 @@ TEST_CASE("spots fall off as the reference code of KHR_lights_punctual") {
   for (const auto& [inner, outer] : {std::pair(0.2f, 0.7f), std::pair(0.0f, 0.785398f), std::pair(0.6f, 0.6001f), std::pair(0.01f, 0.03f)}) {
     const PunctualSource spot = PunctualSource::spot({}, {0, 0, -1}, Color(1), std::cos(inner), std::cos(outer));
     double sum = 0;
+    float largest_error = 0;
     constexpr int kSteps = 200000;
     for (int i = 0; i < kSteps; ++i) {
       // Midpoint rule over the cosine, where it is not zero.
       const float range = 1 - std::cos(outer), cosine = std::cos(outer) + range * (static_cast<float>(i) + 0.5f) / kSteps;
       const float scale = 1.0f / std::max(0.001f, std::cos(inner) - std::cos(outer));
       const float reference = sqr(std::clamp(cosine * scale - std::cos(outer) * scale, 0.0f, 1.0f));
-      CHECK(spot.attenuation(cosine) == doctest::Approx(reference).epsilon(1e-3));
+      largest_error = std::max(largest_error, std::abs(spot.attenuation(cosine) - reference));
       sum += 2 * kPi * range / kSteps * static_cast<double>(spot.attenuation(cosine));
     }
+    CHECK(largest_error < 5e-4f);
     CHECK(spot.effective_solid_angle() == doctest::Approx(sum).epsilon(1e-3));
 
     Random random(7);
     std::vector<double> observed(40), expected(40);
     const float range = 1 - std::cos(outer);
+    int outside = 0;
     constexpr int kCount = 100000;
     for (int i = 0; i < kCount; ++i) {
       const float x = (spot.sample_cos(random()) - std::cos(outer)) / range;
-      CHECK(x > -1e-3f);
+      outside += x > -1e-3f ? 0 : 1;
       observed[static_cast<std::size_t>(std::clamp(static_cast<int>(x * 40), 0, 39))] += 1;
     }
     for (int i = 0; i < 40; ++i) {
@@ -154,6 +153,7 @@ TEST_CASE("spots fall off as the reference code of KHR_lights_punctual") {
         cell += static_cast<double>(spot.attenuation(std::cos(outer) + range * (static_cast<float>(i) + (static_cast<float>(j) + 0.5f) / 200) / 40)) / 200;
       expected[static_cast<std::size_t>(i)] = kCount * cell * 2 * kPi * range / 40 / spot.effective_solid_angle();
     }
+    CHECK(outside == 0);
     if (outer > 0.1f) CHECK(chi_square_accepts(observed, expected));
   }
 }

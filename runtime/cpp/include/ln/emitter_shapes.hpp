@@ -113,6 +113,7 @@ struct ViewedLight {
 
     // Corner c moves along its arc to c' = (k_b b + k_c c) / norm (unit vectors), such that (0, b, c') has the solid
     // angle 2 tau.
+    if (!(l0 * lb * lc > 0)) return {};  // seen from a corner
     const T inv_l0 = 1 / l0, inv_lb = 1 / lb, inv_lc = 1 / lc;
     const T cos_bc = rbc * inv_lb * inv_lc;
     const T g1 = r0c * lb + rbc * l0, g2 = l0 * lb * lc + r0b * lc;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,8 +16,9 @@ import pytest
 from lnc.library import Library
 from lnc.library_reader import load_library
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parent
 SCENES = ROOT / "examples" / "scenes"
+FEW = 4  # tests that build what they need by themselves; more of them have everything built at once
 
 
 @dataclass(frozen=True)
@@ -86,20 +88,44 @@ def run_program(tmp_path: Path) -> Callable[..., Run]:
 
 
 @pytest.fixture(scope="session")
-def runtime_tool() -> Callable[[str], Path]:
+def runtime_build() -> Path:
+    """The runtime's build folder, configured with unit tests and tools."""
+    from lnc.build import BuildOptions, build_runtime
+
+    folder = build_runtime(BuildOptions(), quiet=True).folder
+    done = subprocess.run(
+        ["cmake", "-S", str(ROOT), "-B", str(folder), "-DLN_TESTS=ON"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+@pytest.fixture(scope="session")
+def runtime_tool(runtime_build: Path, request: pytest.FixtureRequest) -> Callable[[str], Path]:
     """runtime_tool("ln_scene_info"): a developer tool or unit test of the runtime, built."""
+    jobs = str(len(os.sched_getaffinity(0)))
+
+    def build(*options: str) -> subprocess.CompletedProcess[str]:
+        command = ["cmake", "--build", str(runtime_build), "-j", jobs, *options]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    if sum("runtime_tool" in getattr(item, "fixturenames", ()) for item in request.session.items) > FEW:
+        build("--", *(("-k", "0") if (runtime_build / "build.ninja").exists() else ("-k",)))  # on all processors
 
     @cache
     def tool(name: str) -> Path:
-        from lnc.build import BuildOptions, build_runtime
-
-        folder = build_runtime(BuildOptions(), quiet=True).folder
-        for command in (
-            ["cmake", "-S", str(ROOT), "-B", str(folder), "-DLN_TESTS=ON"],
-            ["cmake", "--build", str(folder), "--target", name],
-        ):
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            assert done.returncode == 0, done.stdout + done.stderr
-        return folder / name
+        done = build("--target", name)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return runtime_build / name
 
     return tool
+
+
+COMPILES = {"compiled_network", "runtime_build"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A test is marked `program` if one of its fixtures compiles C++."""
+    for item in items:
+        if COMPILES.intersection(getattr(item, "fixturenames", ())):
+            item.add_marker("program")

@@ -1,4 +1,4 @@
-"""KDPhotonTree: what it finds is what a search of all photons finds (in C++), and it is inserted where it is left out."""
+"""KDPhotonTree: it finds what a search of all photons finds (in C++), and is inserted where it is left out."""
 
 import subprocess
 from pathlib import Path

@@ -23,7 +23,7 @@ class PathTracing final : public NetworkRun {
         if (tile.stopped()) return;
         const std::uint32_t key = hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)), seed_hash());
         for_samples(key, tile, tracer, [&](const SampleStream& random) {
-          const Vec2 pixel = Vec2(static_cast<float>(x), static_cast<float>(y)) + random.get2(kOwn);
+          const Vec2 pixel = Vec2(static_cast<float>(x), static_cast<float>(y)) + random.get2(0, kOwn);
           film.add(x, y, random.index(), radiance(tracer, camera().ray(pixel), random));
         });
       }
@@ -45,7 +45,7 @@ class PathTracing final : public NetworkRun {
 
     for (std::uint32_t depth = 0;; ++depth) {
       const RayKind kind = seen ? RayKind::camera : RayKind::gather;
-      const Hit hit = tracer.intersect(ray, random.bits(depth * kPerVertex + kCoverage + 1), seen ? kEye : kDirect, kind);
+      const Hit hit = tracer.intersect(ray, random.bits(depth, kCoverage + 1), seen ? kEye : kDirect, kind);
       if (!hit.found()) {
         const Color light = emitters.environment(ray.direction);
         if (is_black(light)) return result;
@@ -65,24 +65,24 @@ class PathTracing final : public NetworkRun {
       // Russian roulette.
       if (!seen && depth >= 2) {
         const float survival = std::min(max_component(beta), 0.95f);
-        if (random.get1(depth * kPerVertex + kRoulette) >= survival) return result;
+        if (random.get1(depth, kRoulette) >= survival) return result;
         beta /= survival;
       }
 
-      const std::uint32_t base = (depth + 1) * kPerVertex;
+      const std::uint32_t vertex = depth + 1;
       from = at.at;
       from_side = at.bsdf().transmits_smoothly() ? Vec3(0) : at.front ? at.at.ng : -at.at.ng;
 
       // Light from an emitter.
       if (any(at.bsdf().events() & Events::DG)) {
-        const LightSample s = emitters.sample(from, from_side, random.get1(base + kPick), random.get2(base + kPosition));
+        const LightSample s = emitters.sample(from, from_side, emitters.size() == 1 ? 0 : random.get1(vertex, kPick), random.get2(vertex, kPosition));
         if (s.pdf_w > 0 && !is_black(s.radiance)) {
           const Vec3 local = at.frame.to_local(s.wi);
           if (at.side_agrees(s.wi, local.z)) {
             const BsdfValue bsdf = at.bsdf().evaluate(at.wo_local, local);
             if (!is_black(bsdf.f_cos)) {
               const Ray shadow = std::isfinite(s.distance) ? spawn_ray_to(from, s.position) : spawn_ray(from, s.wi);
-              if (!tracer.occluded(shadow, random.bits(base + kCoverage), kDirect)) {
+              if (!tracer.occluded(shadow, random.bits(vertex, kCoverage), kDirect)) {
                 const float weight = s.delta ? 1.0f : mis_weight(s.pdf_w, bsdf.pdf_w);
                 result += beta * bsdf.f_cos * s.radiance * (weight / s.pdf_w);
               }
@@ -93,7 +93,8 @@ class PathTracing final : public NetworkRun {
 
       // The next direction.
       BsdfSample s;
-      if (!at.bsdf().sample(at.wo_local, random.get1(base + kBsdfLobe), random.get2(base + kBsdfDirection), Events::all, Carried::radiance, s))
+      const float u_lobe = at.bsdf().single_lobe() ? 0 : random.get1(vertex, kBsdfLobe);
+      if (!at.bsdf().sample(at.wo_local, u_lobe, random.get2(vertex, kBsdfDirection), Events::all, Carried::radiance, s))
         return result;
       const Vec3 wi = at.frame.to_world(s.wi);
       if (!at.side_agrees(wi, s.wi.z)) return result;
@@ -104,7 +105,7 @@ class PathTracing final : public NetworkRun {
         seen = false;
       } else if (seen && depth >= 16) {
         const float survival = std::min(max_component(beta), 0.95f);
-        if (random.get1(base + kRoulette) >= survival) return result;
+        if (random.get1(vertex, kRoulette) >= survival) return result;
         beta /= survival;
       }
     }

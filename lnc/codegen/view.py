@@ -27,6 +27,7 @@ class InputView:
 
     terms: tuple[TermView, ...]
     accessor: str = ""
+    functor: str = ""  # name of the type that evaluates the terms
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,6 @@ class NodeView:
     fields: tuple[tuple[str, str], ...]
     inputs: tuple[InputView, ...]
     tables: tuple[TableView, ...]
-    head: bool
     prepares: bool
     name: str
     op: str
@@ -164,9 +164,8 @@ class _Builder:
             pull=self.pulls[n.identifier] if n.op.output == POINTS else "",
             constant=self.constants[n.identifier],
             fields=tuple((p.name, self.field(n, p)) for p in n.parameters if not isinstance(p.value, PathValue)),
-            inputs=tuple(argument for i in n.inputs for argument in self.arguments(i)),
+            inputs=tuple(argument for i in n.inputs for argument in self.arguments(n, i)),
             tables=tables,
-            head=n.head,
             prepares=n.prepares,
             name=n.name,
             op=n.op.name,
@@ -210,11 +209,14 @@ class _Builder:
             accepting=tuple("true" if a else "false" for a in events.accepting),
         )
 
-    def arguments(self, i: ScheduledInput) -> list[InputView]:
+    def arguments(self, n: ScheduledNode, i: ScheduledInput) -> list[InputView]:
         """One argument, or one a term for a variadic port."""
         if i.port.representation == POINTS:
             terms = self.terms(i.terms)
-            return [InputView((t,)) for t in terms] if i.port.variadic else [InputView(terms)]
+            functor = f"{self.members[n.identifier]}_{i.port.name}"
+            if i.port.variadic:
+                return [InputView((t,), "", f"{functor}_{k}") for k, t in enumerate(terms)]
+            return [InputView(terms, "", functor)]
         if len(i.terms) != 1 or i.terms[0].weight != 1:
             raise InternalError(f"a sum of {i.port.representation} at port {i.port.name}")
         source = self.by_name[i.terms[0].node]

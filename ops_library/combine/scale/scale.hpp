@@ -10,7 +10,7 @@ struct Scale {
   float factor = 1;
 
   template <class Request, class In>
-  Color answer(Request& request, const In& in) const {
+  LN_INLINE Color answer(Request& request, const In& in) const {
     return factor * in(request);
   }
 };

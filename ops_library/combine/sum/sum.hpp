@@ -9,7 +9,7 @@ struct Sum {
   NodeId node;
 
   template <class Request, class... Terms>
-  Color answer(Request& request, const Terms&... terms) const {
+  LN_INLINE Color answer(Request& request, const Terms&... terms) const {
     Color sum(0);
     ((sum += terms(request)), ...);  // in the order of the text: same input, same bits
     return sum;

@@ -11,7 +11,7 @@ struct Direct {
   TagSet to = kAnyTag;
 
   template <class Request>
-  Color answer(Request& request, const Emitters& light) const {
+  LN_INLINE Color answer(Request& request, const Emitters& light) const {
     if (!reaches(request, to) || light.empty()) return Color(0);
     Color result(0);
     if (request.takes_samples()) result += sample_emitters(request, light);
@@ -26,12 +26,12 @@ struct Direct {
 
   /// Emitters chosen by their importance for the point; area emitters share their light with the BSDF's sample.
   template <class Request>
-  Color sample_emitters(Request& request, const Emitters& light) const {
+  LN_INLINE Color sample_emitters(Request& request, const Emitters& light) const {
     const auto n = static_cast<std::uint32_t>(samples);
     Color sum(0);
     for (std::uint32_t j = 0; j < n; ++j) {
-      const float pick = request.random().get1(request.dimension(own(kPick)), j, n);
-      const Vec2 position = request.random().get2(request.dimension(own(kPosition)), j, n);
+      const float pick = light.size() == 1 ? 0 : request.random().get1(request.depth(), own(kPick), j, n);
+      const Vec2 position = request.random().get2(request.depth(), own(kPosition), j, n);
       const LightSample s = light.sample(request.at().at, request.emitter_side(), pick, position);
       if (!(s.pdf_w > 0) || is_black(s.radiance)) continue;
       const BsdfValue bsdf = request.evaluate(s.wi);
@@ -44,7 +44,7 @@ struct Direct {
   }
 
   template <class Request>
-  Color emission_on_bsdf_ray(Request& request, const Emitters& light) const {
+  LN_INLINE Color emission_on_bsdf_ray(Request& request, const Emitters& light) const {
     const BsdfRay* ray = request.bsdf_ray(node);
     if (!ray) return Color(0);
     const Vec3 wi = ray->ray.direction;

@@ -12,29 +12,35 @@ struct PathTracer {
   TagSet from = kAnyTag, to = kAnyTag;
 
   template <class Request, class In>
-  Color answer(Request& request, const In& in) const {
+  LN_INLINE Color answer(Request& request, const In& in) const {
     if (!reaches(request, to)) return Color(0);
     if (max_depth > 0 && request.depth() >= static_cast<std::uint64_t>(max_depth)) return Color(0);
     const BsdfRay* ray = request.bsdf_ray(node);
     if (!ray || !ray->hit.found()) return Color(0);
-
-    const Scene& scene = request.tracer().scene();
-    const Interaction at(scene, ray->ray, ray->hit);
-    if (from != kAnyTag && !(scene.part_tags(at.part) & from)) return Color(0);
-    if (!any(at.bsdf().events() & kVia)) return Color(0);
-
-    Color weight = ray->weight * at.transmittance;
-    const float survival = survival_probability(request.beta() * weight, request.depth());
-    if (survival < 1) {
-      if (request.random().get1(request.dimension(kRoulette)) >= survival) return Color(0);
-      weight /= survival;
-    }
-    ln::Request<kVia> next(request.tracer(), request.random(), at, request.beta() * weight, request.depth() + 1, RayKind::gather);
-    return weight * in(next);
+    return arrive(request.tracer(), request.random(), *ray, request.beta(), request.depth(), in);
   }
 
  private:
   static constexpr Events kVia = single_step(Via{});
+
+  /// Asks for the light at the point that `ray` hit. The one function of a pull cycle that is not inlined.
+  template <class In>
+  LN_NOINLINE Color arrive(Tracer& tracer, const SampleStream& random, const BsdfRay& ray, const Color& beta, std::uint32_t depth,
+                           const In& in) const {
+    const Scene& scene = tracer.scene();
+    const Interaction at(scene, ray.ray, ray.hit);
+    if (from != kAnyTag && !(scene.part_tags(at.part) & from)) return Color(0);
+    if (!any(at.bsdf().events() & kVia)) return Color(0);
+
+    Color weight = ray.weight * at.transmittance;
+    const float survival = survival_probability(beta * weight, depth);
+    if (survival < 1) {
+      if (random.get1(depth, kRoulette) >= survival) return Color(0);
+      weight /= survival;
+    }
+    ln::Request<kVia> next(tracer, random, at, beta * weight, depth + 1, RayKind::gather);
+    return weight * in(next);
+  }
 
   /// Russian roulette: paths go on with the share of light that they still carry.
   static float survival_probability(const Color& beta, std::uint32_t depth) {

@@ -10,7 +10,7 @@ struct WireTap {
   int layer = 0;  // position in the picture's list of layers
 
   template <class Request, class In>
-  Color answer(Request& request, const In& in) const {
+  LN_INLINE Color answer(Request& request, const In& in) const {
     const Color value = in(request);
     if (request.seen()) request.tracer().layers()[layer] += request.beta() * value;
     return value;

@@ -93,6 +93,7 @@ Emitters::Emitters(const SceneData& scene, const Image* environment, const Emitt
     environment_ = std::make_unique<Environment>(*environment);
     if (environment_->is_black()) environment_.reset();
   }
+  size_ = area_.size() + punctual_.size() + distant_.size() + (has_environment() ? 1 : 0);
   build_tree();
   build_power();
 }

@@ -66,6 +66,9 @@ class Bsdf {
   /// The kinds of lobes that exist, whatever wo.
   Events events() const { return events_; }
 
+  /// Is there no choice between lobes, so that `sample` does not use its first number?
+  bool single_lobe() const { return kind_ != Kind::layered; }
+
   /// Can smooth lobes send light through the surface?
   bool transmits_smoothly() const { return wall_ != Wall::opaque && rough_ && any(events_ & Events::G); }
 

@@ -53,7 +53,7 @@ class Emitters {
 
   bool empty() const { return size() == 0; }
   /// Number of light sources, environment included; a parallelogram of two triangles is one.
-  std::size_t size() const { return area_.size() + punctual_.size() + distant_.size() + (has_environment() ? 1 : 0); }
+  std::size_t size() const { return size_; }
   /// Is there light that a ray can find: emissive surfaces or an environment?
   bool has_area() const { return has_surfaces_ || has_environment(); }
   /// Are there point, spot or directional lights?
@@ -138,6 +138,7 @@ class Emitters {
 
   const SceneData* scene_;
   bool has_surfaces_ = false;
+  std::size_t size_ = 0;
   std::vector<Surface> surfaces_;                 // by part
   std::vector<std::uint32_t> light_of_triangle_;  // of the emitting parts only; kNone: without power
   std::vector<AreaLight> area_;                   // finite light i: area_[i], then punctual_

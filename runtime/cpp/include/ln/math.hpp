@@ -14,6 +14,10 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+/// For the few functions that are the inside of every sample: their callers are what is measured.
+#define LN_INLINE [[gnu::always_inline]] inline
+#define LN_NOINLINE [[gnu::noinline]]
+
 namespace ln {
 
 using Vec2 = glm::vec2;

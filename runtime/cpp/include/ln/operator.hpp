@@ -6,6 +6,7 @@
 // is missing or misspelt does not compile. Depending on its output:
 //
 //   Points       template <class Request, class In...> Color answer(Request&, const In&...) const
+//                (an operator that bounds a recursion reads its input from a function marked LN_NOINLINE, all else is inlined)
 //   otherwise    an accessor that its consumers know, e.g. const Emitters& emission() const
 //
 // and, if it works before the picture, void prepare(PrepareContext&, const In&...), called once, in schedule order, with
@@ -15,9 +16,6 @@
 
 #include "ln/prepare.hpp"
 #include "ln/request.hpp"
-
-/// Marks a function of a pull cycle: it calls itself and is not to be unrolled into itself.
-#define LN_RECURSIVE __attribute__((noinline))
 
 namespace ln {
 

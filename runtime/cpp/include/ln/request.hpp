@@ -35,14 +35,12 @@ class Request {
   const Color& beta() const { return beta_; }
   /// The point is seen by the eye, directly or by specular surfaces.
   bool seen() const { return kind_ == RayKind::camera; }
-  /// Random numbers of this vertex for `own` purposes of an operator.
-  std::uint32_t dimension(std::uint32_t own) const { return depth_ * kPerVertex + own; }
 
   /// Can the receiver scatter samples, i.e. light from directions of the operator's choice?
   bool takes_samples() const { return any(at_.bsdf().events() & kReceives & Events::DG); }
 
   /// BSDF times |cos| for light from `wi`, and the solid-angle density with which the shared sample picks that direction.
-  BsdfValue evaluate(const Vec3& wi) const {
+  LN_INLINE BsdfValue evaluate(const Vec3& wi) const {
     const Vec3 local = at_.frame.to_local(wi);
     if (!at_.side_agrees(wi, local.z)) return {};
     static_assert((kReceives & Events::DG) == (kSamples & Events::DG), "the shared sample picks what the receiver scatters");
@@ -62,29 +60,30 @@ class Request {
   }
 
   /// Is the way to an emitter free?
-  bool visible(const LightSample& light, NodeId node) {
+  LN_INLINE bool visible(const LightSample& light, NodeId node) {
     const Ray ray = std::isfinite(light.distance) ? spawn_ray_to(at_.at, light.position) : spawn_ray(at_.at, light.wi);
-    return !tracer_.occluded(ray, random_.bits(dimension(kCoverage)), node);
+    return !tracer_.occluded(ray, random_.bits(depth_, kCoverage), node);
   }
 
   /// The shared sample, drawn and traced when it is first asked for, at the cost of `node`; null if there is none that
   /// the receiver can scatter.
-  const BsdfRay* bsdf_ray(NodeId node) {
+  LN_INLINE const BsdfRay* bsdf_ray(NodeId node) {
     if (!sample() || !any(sample_.event & kReceives)) return nullptr;
     if (!traced_) {
       traced_ = true;
-      sample_.hit = tracer_.intersect(sample_.ray, random_.bits(dimension(kCoverage) + 1), node, RayKind::gather);
+      sample_.hit = tracer_.intersect(sample_.ray, random_.bits(depth_, kCoverage + 1), node, RayKind::gather);
     }
     return &sample_;
   }
 
   /// The shared sample without its ray being traced; null: nothing is scattered.
-  const BsdfRay* sample() {
+  LN_INLINE const BsdfRay* sample() {
     if (!sampled_) {
       sampled_ = true;
       BsdfSample s;
-      valid_ = at_.bsdf().sample(at_.wo_local, random_.get1(dimension(kBsdfLobe)), random_.get2(dimension(kBsdfDirection)), kSamples,
-                               Carried::radiance, s);
+      const Bsdf& bsdf = at_.bsdf();
+      const float u_lobe = bsdf.single_lobe() ? 0 : random_.get1(depth_, kBsdfLobe);
+      valid_ = bsdf.sample(at_.wo_local, u_lobe, random_.get2(depth_, kBsdfDirection), kSamples, Carried::radiance, s);
       if (valid_) {
         const Vec3 wi = at_.frame.to_world(s.wi);
         valid_ = at_.side_agrees(wi, s.wi.z);
@@ -105,7 +104,9 @@ class Request {
   std::uint32_t depth_;
   RayKind kind_;
   bool sampled_ = false, valid_ = false, traced_ = false;
-  BsdfRay sample_;
+  union {
+    BsdfRay sample_;  // if sampled_
+  };
 };
 
 /// Weight of a technique of density `a` beside one of density `b` for the same light (power heuristic; Veach 1997, eq. 9.14).

@@ -12,6 +12,7 @@
 
 #include "ln/camera.hpp"
 #include "ln/film.hpp"
+#include "ln/operator.hpp"
 #include "ln/prepare.hpp"
 #include "ln/program.hpp"
 #include "ln/render_passes.hpp"
@@ -77,7 +78,7 @@ Color eye_radiance(const Network& network, Tracer& tracer, Ray ray, const Sample
   const Scene& scene = tracer.scene();
   Color result(0), beta(1);
   for (std::uint32_t depth = 0;; ++depth) {
-    const Hit hit = tracer.intersect(ray, random.bits(depth * kPerVertex + kCoverage + 1), kEye, RayKind::camera);
+    const Hit hit = tracer.intersect(ray, random.bits(depth, kCoverage + 1), kEye, RayKind::camera);
     if (!hit.found()) {
       result += beta * scene.emitters().environment(ray.direction);
       return result;
@@ -98,7 +99,7 @@ Color eye_radiance(const Network& network, Tracer& tracer, Ray ray, const Sample
     constexpr std::uint32_t kRouletteDepth = 16;
     if (depth >= kRouletteDepth) {
       const float survival = std::min(max_component(beta), 0.95f);
-      if (random.get1((depth + 1) * kPerVertex + kRoulette) >= survival) return result;
+      if (random.get1(depth + 1, kRoulette) >= survival) return result;
       beta /= survival;
     }
   }
@@ -141,8 +142,8 @@ class NetworkProgram final : public NetworkRun {
  private:
   void render_sample(int x, int y, std::uint32_t key, const SampleStream& random, Tracer& tracer, Film& film) {
     const std::uint32_t sample = random.index();
-    const SampleTimer timer(tracer, hash32(key, sample));
-    const Vec2 pixel = Vec2(static_cast<float>(x), static_cast<float>(y)) + random.get2(kPixel);
+    const SampleTimer timer(tracer, key + sample);
+    const Vec2 pixel = Vec2(static_cast<float>(x), static_cast<float>(y)) + random.get2(0, kPixel);
     film.add(x, y, sample, eye_radiance(network_, tracer, camera().ray(pixel), random));
     for (std::size_t layer = 0; layer < layer_count_; ++layer) {
       film.add_layer(static_cast<int>(layer), x, y, tracer.layers()[layer]);

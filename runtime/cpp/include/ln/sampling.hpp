@@ -65,7 +65,8 @@ constexpr Vec2 sobol_point(std::uint32_t key, std::uint32_t d, std::uint32_t ind
 class SampleBlock {
  public:
   static constexpr std::uint32_t kSamples = 16;
-  static constexpr std::uint32_t kDimensions = 8 * 16;  // of the first vertices of a path
+  static constexpr std::uint32_t kVertices = 8, kOwnDimensions = 16;  // the first ones, of a path and of each vertex
+  static constexpr std::uint32_t kDimensions = kVertices * kOwnDimensions;
 
   /// Serves samples [first, first + kSamples) of the stream with this key from now on.
   void begin(std::uint32_t key, std::uint32_t first) {
@@ -75,13 +76,13 @@ class SampleBlock {
   }
 
   /// `slot` < kDimensions: place of dimension `d` in the block.
-  Vec2 point(std::uint32_t slot, std::uint32_t d, std::uint32_t index) {
+  LN_INLINE Vec2 point(std::uint32_t slot, std::uint32_t d, std::uint32_t index) {
     if (!(filled_[slot / 64] >> (slot % 64) & 1)) fill(slot, d);
     return {x_[slot][index - first_], y_[slot][index - first_]};
   }
 
  private:
-  void fill(std::uint32_t slot, std::uint32_t d) {
+  LN_NOINLINE void fill(std::uint32_t slot, std::uint32_t d) {
     filled_[slot / 64] |= std::uint64_t{1} << (slot % 64);
     for (std::uint32_t i = 0; i < kSamples; ++i) {
       const Vec2 p = sobol_point(key_, d, first_ + i);
@@ -107,27 +108,37 @@ class SampleStream {
   /// `block`: optional; must serve this key and index.
   SampleStream(std::uint32_t key, std::uint32_t index, SampleBlock* block = nullptr) : key_(key), index_(index), block_(block) {}
 
-  /// A point of the unit square for dimension `d`.
-  Vec2 get2(std::uint32_t d) const {
-    constexpr std::uint32_t kCached = 16;  // dimensions of a vertex that a block holds
-    const std::uint32_t slot = d / kPerVertex * kCached + d % kPerVertex;
-    if (block_ && d % kPerVertex < kCached && slot < SampleBlock::kDimensions) return block_->point(slot, d, index_);
-    return sobol_point(key_, d, index_);
+  /// A point of the unit square: dimension `own` of vertex `vertex` of the path.
+  LN_INLINE Vec2 get2(std::uint32_t vertex, std::uint32_t own) const {
+    if (block_ && vertex < SampleBlock::kVertices && own < SampleBlock::kOwnDimensions)
+      return block_->point(vertex * SampleBlock::kOwnDimensions + own, vertex * kPerVertex + own, index_);
+    return scalar_point(vertex * kPerVertex + own);
   }
   /// Point `j` of the `n` that each sample draws.
-  Vec2 get2(std::uint32_t d, std::uint32_t j, std::uint32_t n) const {
-    return n == 1 ? get2(d) : sobol_point(key_, d, index_ * n + j);
+  LN_INLINE Vec2 get2(std::uint32_t vertex, std::uint32_t own, std::uint32_t j, std::uint32_t n) const {
+    return n == 1 ? get2(vertex, own) : sobol_point(key_, vertex * kPerVertex + own, index_ * n + j);
   }
 
+  /// The same by the dimension's number, vertex * kPerVertex + own.
+  Vec2 get2(std::uint32_t d) const { return get2(d / kPerVertex, d % kPerVertex); }
+  Vec2 get2(std::uint32_t d, std::uint32_t j, std::uint32_t n) const { return get2(d / kPerVertex, d % kPerVertex, j, n); }
   float get1(std::uint32_t d) const { return get2(d).x; }
   float get1(std::uint32_t d, std::uint32_t j, std::uint32_t n) const { return get2(d, j, n).x; }
 
-  /// A number that need not be well distributed, only different: coverage decisions.
-  std::uint32_t bits(std::uint32_t d) const { return hash32(hash32(key_, d), index_); }
+  LN_INLINE float get1(std::uint32_t vertex, std::uint32_t own) const { return get2(vertex, own).x; }
+  LN_INLINE float get1(std::uint32_t vertex, std::uint32_t own, std::uint32_t j, std::uint32_t n) const { return get2(vertex, own, j, n).x; }
+
+  /// A number that differs from any other of the stream, to be hashed where it is used: coverage decisions.
+  std::uint32_t bits(std::uint32_t d) const { return bits(d / kPerVertex, d % kPerVertex); }
+  std::uint32_t bits(std::uint32_t vertex, std::uint32_t own) const {
+    return key_ + (vertex * kPerVertex + own) * 0x9e3779b9u + index_ * 0x85ebca6bu;
+  }
 
   std::uint32_t index() const { return index_; }
 
  private:
+  LN_NOINLINE Vec2 scalar_point(std::uint32_t d) const { return sobol_point(key_, d, index_); }
+
   std::uint32_t key_ = 0, index_ = 0;
   SampleBlock* block_ = nullptr;
 };

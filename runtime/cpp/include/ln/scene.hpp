@@ -79,7 +79,7 @@ class Scene {
   Events events() const { return events_; }
 
   /// Position, error bound and geometric normal at a hit.
-  void locate(const Hit& hit, SurfacePosition& at) const {
+  LN_INLINE void locate(const Hit& hit, SurfacePosition& at) const {
     const UVec3 i = data_.triangles[hit.triangle];
     const Vec3 a = data_.positions[i.x], b = data_.positions[i.y], c = data_.positions[i.z];
     const Vec3 pa = (1 - hit.u - hit.v) * a, pb = hit.u * b, pc = hit.v * c;
@@ -109,7 +109,7 @@ class Scene {
   Events events_ = Events::none;
 };
 
-inline Interaction::Interaction(const Scene& scene, const Ray& ray, const Hit& found)
+LN_INLINE Interaction::Interaction(const Scene& scene, const Ray& ray, const Hit& found)
     : wo(-ray.direction), hit(found), part(scene.data_.triangle_part[found.triangle]) {
   scene.locate(hit, at);
   front = glm::dot(wo, at.ng) >= 0;

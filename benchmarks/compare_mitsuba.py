@@ -120,7 +120,7 @@ def summary(runs: dict[str, Runs], truth: Reference) -> dict[str, Any]:
             "relmse": error,
             "seconds_to_1e-2": seconds * error / 1e-2,
             "mean_ratio": statistics.mean(ratios),
-            "mean_ratio_error": statistics.stdev(ratios) / len(ratios) ** 0.5 if len(ratios) > 1 else None,
+            "mean_ratio_error": _mean_ratio_error(ratios, truth) if len(ratios) > 1 else None,
         }
     ours = result[OURS]
     for name, r in runs.items():
@@ -136,6 +136,12 @@ def summary(runs: dict[str, Runs], truth: Reference) -> dict[str, Any]:
     if rays and render_seconds:
         result[OURS]["million_rays_per_second"] = rays / render_seconds / 1e6
     return result
+
+
+def _mean_ratio_error(ratios: Sequence[float], truth: Reference) -> float:
+    """Standard error of the mean of the ratios, that of the reference included; its channels may vary together."""
+    of_truth = np.sqrt(3 * truth.variance.sum()) / truth.image.sum()
+    return float(np.hypot(statistics.stdev(ratios) / len(ratios) ** 0.5, of_truth))
 
 
 def report(result: dict[str, Any], truth: Reference) -> str:

@@ -277,7 +277,7 @@ LightSample Emitters::sample_finite(const SurfacePosition& at, std::uint32_t ind
     result.pdf_w = pmf * s.pdf_w;
   } else {
     const PunctualSource& light = punctual_[index - area_.size()];
-    result.position = {light.position, Vec3(0), Vec3(0)};
+    result.position = {light.position, 0, Vec3(0)};
     result.radiance = light.intensity;
     result.pdf_w = pmf;
     result.delta = true;
@@ -440,7 +440,7 @@ PhotonEmission Emitters::emit(float u_pick, const Vec2& u_position, const Vec2& 
     const PunctualSource& light = punctual_[index];
     const float cosine = light.sample_cos(u_direction.x), sine = safe_sqrt(1 - cosine * cosine), phi = 2 * kPi * u_direction.y;
     photon.direction = make_frame(light.direction).to_world({sine * std::cos(phi), sine * std::sin(phi), cosine});
-    photon.position = {light.position, Vec3(0), Vec3(0)};
+    photon.position = {light.position, 0, Vec3(0)};
     photon.flux = light.intensity * (light.effective_solid_angle() * inverse);
     photon.delta = true;
     return photon;
@@ -461,7 +461,7 @@ PhotonEmission Emitters::emit(float u_pick, const Vec2& u_position, const Vec2& 
   photon.flux *= kPi * sqr(scene_radius_);
   const Frame frame = make_frame(photon.direction);
   const float r = scene_radius_ * std::sqrt(u_position.x), phi = 2 * kPi * u_position.y;
-  photon.position = {frame.to_world({r * std::cos(phi), r * std::sin(phi), -scene_radius_}), Vec3(0), Vec3(0)};
+  photon.position = {frame.to_world({r * std::cos(phi), r * std::sin(phi), -scene_radius_}), 0, Vec3(0)};
   return photon;
 }
 

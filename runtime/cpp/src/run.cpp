@@ -1,6 +1,7 @@
 #include "ln/run.hpp"
 
 #include <cmath>
+#include <glm/common.hpp>
 
 #include "ln/gltf.hpp"
 #include "ln/image_reader.hpp"
@@ -45,12 +46,27 @@ bool has_emitter(const SceneData& data) {
   return false;
 }
 
-/// The light of a scene without any: a white sky of radiance 1 all around.
-Image default_environment() {
+/// The light of a scene without any: a clear sky over grey ground, with a soft sun at the upper right of the default view.
+/// Rows of a lat-long picture as Environment has it; radiance in W/(m^2 sr).
+Image default_sky() {
+  constexpr Color kZenith(0.35f, 0.5f, 0.9f), kHorizon(0.85f, 0.9f, 1.0f), kGround(0.25f, 0.23f, 0.2f), kSun(6.0f, 5.5f, 4.6f);
+  constexpr float kSunWidth = 0.35f;  // [rad]
+  const Vec3 sun = glm::normalize(Vec3(0.6f, 0.8f, 0.5f));
   Image image;
-  image.width = image.height = 1;
+  image.width = 128;
+  image.height = 64;
   image.channels = 3;
-  image.floats = {1, 1, 1};
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      const float theta = kPi * (static_cast<float>(y) + 0.5f) / static_cast<float>(image.height);
+      const float phi = kPi * (1 - 2 * (static_cast<float>(x) + 0.5f) / static_cast<float>(image.width));
+      const Vec3 w(std::sin(theta) * std::sin(phi), std::cos(theta), std::sin(theta) * std::cos(phi));
+      Color c = w.y > 0 ? glm::mix(kHorizon, kZenith, std::sqrt(w.y)) : kGround;
+      const float angle = std::acos(std::min(1.0f, glm::dot(w, sun)));
+      c += kSun * std::exp(-sqr(angle / kSunWidth));
+      image.floats.insert(image.floats.end(), {c.x, c.y, c.z});
+    }
+  }
   return image;
 }
 
@@ -72,8 +88,8 @@ PictureSize NetworkRun::load(RunContext& context) {
     environment_ = read_image_file(options.environment_path);
     has_environment_ = true;
   } else if (!has_emitter(data_)) {
-    note("the scene has no light: using a white sky of radiance 1");
-    environment_ = default_environment();
+    note("the scene has no light: using a clear sky with a soft sun");
+    environment_ = default_sky();
     has_environment_ = true;
   }
   chosen_camera_ = choose_camera(data_, options.camera);

@@ -96,7 +96,7 @@ struct SceneOfLights {
   }
 };
 
-inline SurfacePosition receiver(const Vec3& p, const Vec3& n = {0, 0, 1}) { return {p, Vec3(0), n}; }
+inline SurfacePosition receiver(const Vec3& p, const Vec3& n = {0, 0, 1}) { return {p, 0, n}; }
 
 /// Irradiance at `p` by `grid`^2 stratified samples of each emitter choice.
 inline Color irradiance(const Emitters& emitters, const Vec3& p, const Vec3& n, int grid, std::uint32_t seed) {

@@ -19,7 +19,7 @@ struct AreaLight {
 
   /// Point a + s e1 + t e2.
   SurfacePosition at(float s, float t) const {
-    return {a + s * e1 + t * e2, rounding_bound(16) * (glm::abs(a) + glm::abs(e1) + glm::abs(e2)), n};
+    return {a + s * e1 + t * e2, position_error(glm::abs(a) + glm::abs(e1) + glm::abs(e2)), n};
   }
 
   /// Height of `p` above the front; at most 0: the front cannot be seen from there.
@@ -129,6 +129,7 @@ struct ViewedLight {
     // A point on the arc from corner 0 to c': k_0 a + k c'. The arc's cosine is c / norm.
     const T inv_norm = 1 / norm;
     const T c = std::min((k_b * r0b * inv_lb + k_c * r0c * inv_lc) * inv_l0, norm), part = T(u.y) * (norm - c);
+    if (!(norm + c > 0)) return {};  // half a circle, in the plane of the light
     const T k = std::sqrt(std::max(T(0), u.y * (2 * norm - part) / (norm + c)));
     const T k_0 = 1 - (part + k * c) * inv_norm, k_1 = k * inv_norm;
 

@@ -84,7 +84,7 @@ class Scene {
     const Vec3 a = data_.positions[i.x], b = data_.positions[i.y], c = data_.positions[i.z];
     const Vec3 pa = (1 - hit.u - hit.v) * a, pb = hit.u * b, pc = hit.v * c;
     at.p = pa + pb + pc;
-    at.p_error = rounding_bound(16) * (glm::abs(pa) + glm::abs(pb) + glm::abs(pc));
+    at.error = position_error(glm::abs(pa) + glm::abs(pb) + glm::abs(pc));
     at.ng = glm::normalize(glm::cross(b - a, c - a));
   }
 

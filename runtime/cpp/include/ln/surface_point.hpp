@@ -19,7 +19,7 @@ struct Hit {
 /// Position on a triangle with a bound of its rounding error, enough to spawn rays from.
 struct SurfacePosition {
   Vec3 p{0};
-  Vec3 p_error{0};     // absolute bound per component
+  float error = 0;     // how far p may lie off its surface, for a ray query too; see position_error
   Vec3 ng{0, 0, 1};    // geometric normal of the front side, unit length
 };
 
@@ -30,21 +30,15 @@ struct Ray {
   float tmax = kInfinity;
 };
 
-inline float next_float_up(float x) {
-  if (x == kInfinity) return x;
-  if (x == 0) x = 0.0f;
-  std::uint32_t bits = __builtin_bit_cast(std::uint32_t, x);
-  bits = x >= 0 ? bits + 1 : bits - 1;
-  return __builtin_bit_cast(float, bits);
-}
-inline float next_float_down(float x) { return -next_float_up(-x); }
+/// Bound of the error of a position that was interpolated from terms whose absolute values add up to `magnitude`. The same
+/// for all directions: a ray query rounds in the triangle's largest coordinates even where it lies exactly at 0. 7 roundings
+/// of the interpolation (Pharr, Jakob & Humphreys, PBR 4th ed., section 6.8.4), the rest for the query.
+inline float position_error(const Vec3& magnitude) { return rounding_bound(24) * max_component(magnitude); }
 
 /// The origin of a ray that leaves `at` towards `w`: moved off the surface by the error bound of the position, to the
-/// side that `w` points to (Pharr, Jakob & Humphreys, PBR 4th ed., section 6.8.6).
+/// side that `w` points to.
 LN_INLINE Vec3 offset_origin(const SurfacePosition& at, const Vec3& w) {
-  // A quarter more than the bound covers the rounding of the sum: an eighth of a bound that counts eight roundings at least.
-  const float d = 1.25f * glm::dot(glm::abs(at.ng), at.p_error);
-  return at.p + std::copysign(d, glm::dot(w, at.ng)) * at.ng;
+  return at.p + std::copysign(at.error, glm::dot(w, at.ng)) * at.ng;
 }
 
 LN_INLINE Ray spawn_ray(const SurfacePosition& at, const Vec3& w) { return {offset_origin(at, w), w, kInfinity}; }

@@ -240,6 +240,7 @@ HUGE = {
     + "".join(f"op M{i}(in: Points) -> Points {{\n    out = M{i - 1}(M{i - 1}(in))\n}}\n" for i in range(1, 30))
     + "image M29(Direct(Lights()))\n",
     "comments": "// comment\n" * 20_000,
+    "unknown": "".join(f"wire{i} = Scale(wier{i})\n" for i in range(5_000)),
     "chain": chain(1_000),
 }
 

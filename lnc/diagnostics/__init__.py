@@ -89,7 +89,8 @@ def did_you_mean(word: str, known: Iterable[str]) -> str | None:
     folded = {name.lower(): name for name in reversed(names)}
     if word.lower() in folded and folded[word.lower()] != word:
         return f"did you mean '{folded[word.lower()]}'?"
-    close = get_close_matches(word, names, n=1, cutoff=0.6)
+    similar = [name for name in names if abs(len(name) - len(word)) <= 3][:100]  # comparing takes its time
+    close = get_close_matches(word, similar, n=1, cutoff=0.6)
     return f"did you mean '{close[0]}'?" if close else None
 
 

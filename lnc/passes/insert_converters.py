@@ -63,7 +63,7 @@ class _Inserter:
         reason = f"'{place}' takes {wanted}"
         if len(terms) == 1:
             return (self._convert(terms[0], wanted, reason, consumer.name, consumer.statement, declared),)
-        reason_points = f"a sum is made of Points, and {reason}"
+        reason_points = "a sum is made of Points" + ("" if wanted == "Points" else f", and {reason}")
         terms = tuple(
             self._convert(term, "Points", reason_points, consumer.name, consumer.statement, declared) for term in terms
         )

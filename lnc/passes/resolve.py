@@ -62,7 +62,8 @@ class _Resolver:
             self._twice(again.span, "the network has a name already", names[0].span)
         self._collect()
         for equation in self.equations.values():
-            self._equation(equation)
+            if not self.reporter.full:
+                self._equation(equation)
         image: Image | None = None
         taps: list[Tap] = []
         expectations: list[Expectation] = []
@@ -212,7 +213,7 @@ class _Resolver:
         return (Term(end, 1.0, wire.span),)
 
     def _unknown_wire(self, wire: ast.WireName) -> None:
-        if wire.name in self.broken:
+        if wire.name in self.broken or self.reporter.full:
             return
         message = f"no wire is called {quote(wire.name)}"
         if wire.name in self.library.operators:
@@ -238,7 +239,7 @@ class _Resolver:
             self._add(name, op, inputs, parameters, origin, home, call.span, annotation)
 
     def _unknown_operator(self, call: ast.Call) -> None:
-        if call.op in self.broken:
+        if call.op in self.broken or self.reporter.full:
             return
         message = f"no operator is called {quote(call.op)}"
         help = did_you_mean(call.op, self.library.operators)

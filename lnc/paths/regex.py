@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
 
 from lnc.paths.automaton import Dfa, Nfa, TooLarge, determinise
 from lnc.paths.language import EMITTERS, EVENTS, Alphabet
@@ -276,20 +278,42 @@ class Renderer:
         return names
 
     def _where(self, combinations: int) -> str:
-        """`@t`, `@!t`, or the combinations in full."""
-        alphabet = self.alphabet
-        if combinations == alphabet.combinations_with(None):
+        """`@t`, `@!t`, `@(t&!u)`, ... or nothing where every combination of tags is meant."""
+        if combinations not in self._named:
+            self._named[combinations] = self._cover(combinations)
+        return self._named[combinations]
+
+    def _cover(self, combinations: int) -> str:
+        """Few conjunctions of tags that together give the combinations: the largest that fit, one after the other."""
+        chosen: list[str] = []
+        left = combinations
+        for text, inside in self._conjunctions:
+            if inside & left and inside & ~combinations == 0:
+                chosen.append(text)
+                left &= ~inside
+            if not left:
+                break
+        if chosen in ([""], []):
             return ""
-        for tag in alphabet.tags:
-            for negated in (False, True):
-                if combinations == alphabet.combinations_with(tag, negated):
-                    return f"@{'!' if negated else ''}{tag}"
-        terms = [
-            "&".join(f"{'' if c >> i & 1 else '!'}{tag}" for i, tag in enumerate(alphabet.tags))
-            for c in range(alphabet.combinations)
-            if combinations >> c & 1
-        ]
-        return f"@({'|'.join(terms)})"
+        alone = len(chosen) == 1 and "&" not in chosen[0]
+        return f"@{chosen[0]}" if alone else f"@({'|'.join(chosen)})"
+
+    @cached_property
+    def _named(self) -> dict[int, str]:
+        return {}
+
+    @cached_property
+    def _conjunctions(self) -> list[tuple[str, int]]:
+        """All conjunctions of tags and negated tags with their combinations, those of few tags first."""
+        alphabet = self.alphabet
+        found: list[tuple[int, str, int]] = []
+        for signs in product((None, False, True), repeat=len(alphabet.tags)):
+            named = [(tag, negated) for tag, negated in zip(alphabet.tags, signs, strict=True) if negated is not None]
+            inside = alphabet.combinations_with(None)
+            for tag, negated in named:
+                inside &= alphabet.combinations_with(tag, negated)
+            found.append((len(named), "&".join(f"{'!' if negated else ''}{tag}" for tag, negated in named), inside))
+        return [(text, inside) for _, text, inside in sorted(found)]
 
 
 def reverse(dfa: Dfa) -> Dfa:

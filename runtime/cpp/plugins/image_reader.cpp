@@ -1,6 +1,7 @@
 // The image decoder: the only part that uses OpenImageIO. Built as a shared object and embedded in the runtime library.
 
-#include "../src/image_plugin.hpp"
+#include <fcntl.h>
+#include <unistd.h>
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
@@ -12,6 +13,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "../src/image_plugin.hpp"
+
 namespace {
 
 /// Limits that hold whatever the caller allows: OpenImageIO checks them before it allocates.
@@ -22,6 +25,27 @@ void set_limits() {
   OIIO::attribute("threads", 1);
   OIIO::attribute("exr_threads", -1);
 }
+
+/// libpng prints its errors to stderr besides reporting them: this keeps them from the terminal while an image is decoded.
+class QuietStderr {
+ public:
+  QuietStderr() : saved_(fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3)) {
+    const int nowhere = saved_ >= 0 ? open("/dev/null", O_WRONLY | O_CLOEXEC) : -1;
+    if (nowhere < 0) return;
+    dup2(nowhere, STDERR_FILENO);
+    close(nowhere);
+  }
+  ~QuietStderr() {
+    if (saved_ < 0) return;
+    dup2(saved_, STDERR_FILENO);
+    close(saved_);
+  }
+  QuietStderr(const QuietStderr&) = delete;
+  QuietStderr& operator=(const QuietStderr&) = delete;
+
+ private:
+  int saved_;
+};
 
 void read(const void* bytes, std::size_t size, const char* format, ln::LnImageAllocate allocate, void* context) {
   OIIO::Filesystem::IOMemReader file(const_cast<void*>(bytes), size);
@@ -48,6 +72,7 @@ extern "C" __attribute__((visibility("default"))) int ln_image_read(const void* 
   try {
     static const bool limited = (set_limits(), true);
     (void)limited;
+    const QuietStderr quiet;
     read(bytes, size, format, allocate, context);
     return 0;
   } catch (const std::exception& error) {

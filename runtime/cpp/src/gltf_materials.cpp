@@ -58,7 +58,7 @@ Wrap wrap(Json json) {
 std::uint8_t uv_set(Json texcoord, Json info, UvSets& sets) {
   const auto wanted = static_cast<std::uint32_t>(std::min<std::int64_t>(texcoord.integer(0), UINT32_MAX));
   for (const bool replace : {false, true}) {
-    for (const std::uint8_t place : {0, 1}) {
+    for (const std::uint8_t place : {1, 0}) {
       if (replace && !sets.used[place]) sets.texcoord[place] = wanted;
       if (sets.texcoord[place] != wanted) continue;
       sets.used[place] = true;

@@ -1,6 +1,9 @@
-// Loads a glTF file and prints what is in it as JSON. Exit status 1, with one line on stderr, if it cannot be loaded.
+// Loads a glTF file and prints what is in it as JSON, and the most memory that loading took. Exit status 1, with one line on
+// stderr, if it cannot be loaded.
 
 #include <cstdio>
+#include <cstdlib>
+#include <fstream>
 #include <string>
 
 #include "ln/gltf.hpp"
@@ -72,6 +75,15 @@ std::string measures_json(const ln::SceneData& s) {
   return "\"area\": " + number_text(area * s.unit * s.unit) + ", \"volume\": " + number_text(volume * s.unit * s.unit * s.unit);
 }
 
+/// The most memory that this process had at a time.
+std::string peak_json() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmHWM:")) return "\"peak_bytes\": " + number_text(1024 * std::strtod(line.c_str() + 6, nullptr));
+  }
+  return "\"peak_bytes\": null";
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -81,12 +93,13 @@ int main(int argc, char** argv) {
   }
   try {
     const ln::SceneData s = ln::load_gltf(argv[1]);
-    std::string out = "{\"triangles\": " + std::to_string(s.triangles.size()) + ", \"vertices\": " + std::to_string(s.positions.size()) + ", \"origin\": " + vector_json(s.origin) +
+    std::string out = "{" + peak_json() + ", \"triangles\": " + std::to_string(s.triangles.size()) + ", \"vertices\": " + std::to_string(s.positions.size()) + ", \"origin\": " + vector_json(s.origin) +
                       ", \"unit\": " + number_text(s.unit) + ",\n " + measures_json(s) + ",\n";
     out += " \"parts\": " + list_json(s.parts, part_json) + ",\n \"materials\": " + list_json(s.materials, material_json) + ",\n \"images\": " + list_json(s.images, image_json);
     out += ",\n \"cameras\": " + list_json(s.cameras, camera_json) + ",\n \"lights\": " + list_json(s.lights, light_json) + ",\n \"notes\": " + list_json(s.notes, quoted) + "}\n";
     std::fputs(out.c_str(), stdout);
   } catch (const ln::Error& error) {
+    std::printf("{%s}\n", peak_json().c_str());
     std::fprintf(stderr, "%s\n", error.what());
     return 1;
   }

@@ -86,8 +86,11 @@ class ResultView:
 
 @dataclass(frozen=True)
 class LayerView:
+    """A wire shown beside the picture; with `file`, as a picture of its own."""
+
     name: str
     light_paths: str
+    file: str = ""
 
 
 @dataclass(frozen=True)
@@ -240,7 +243,7 @@ class _Builder:
         for tap in self.schedule.taps:
             single = tap.terms[0] if len(tap.terms) == 1 else None
             paths = " | ".join(self.wire_paths.get(t.node, "") for t in tap.terms)
-            self.layers.append(LayerView(Path(tap.file).stem, paths))
+            self.layers.append(LayerView(Path(tap.file).stem, paths, tap.file))
             number = len(self.layers) - 1
             same = [i for i, t in enumerate(terms) if single and (t.node, t.weight) == (single.node, single.weight)]
             if same:

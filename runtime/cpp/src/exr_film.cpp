@@ -104,16 +104,19 @@ void write_exr(const std::string& path, const Film& film, const ProgramInfo& pro
   ExrMetadata attributes{{"network", std::string(program.network)}, {"lightPaths", std::string(program.image_paths)}};
   std::vector<std::string> channels;
   add_channels(channels, "");
-  for (const LayerInfo& layer : program.layers) {
+  std::vector<int> shown{Film::kPicture};
+  for (std::size_t i = 0; i < program.layers.size(); ++i) {
+    const LayerInfo& layer = program.layers[i];
+    if (layer.file) continue;
+    shown.push_back(static_cast<int>(i));
     add_channels(channels, std::string(layer.name) + ".");
     attributes.emplace_back("lightPaths." + std::string(layer.name), std::string(layer.light_paths));
   }
   attributes.insert(attributes.end(), metadata.begin(), metadata.end());
 
-  const int layer_count = static_cast<int>(program.layers.size());
   write_rows(path, film.width(), film.height(), channels, attributes, threads, [&](int y, float* row) {
     for (int x = 0; x < film.width(); ++x) {
-      for (int layer = Film::kPicture; layer < layer_count; ++layer) {
+      for (const int layer : shown) {
         const Color value = film.mean(x, y, layer);
         for (std::size_t i = 0; i < 3; ++i) *row++ = value[i];
       }

@@ -171,7 +171,7 @@ int render_program(const Options& options, const ProgramInfo& program, RunCallba
   report_repairs(film);
   write_exr(options.output, film, program, metadata_of(options, outcome), workers.count());
   stats.seconds.total = seconds_since_start();
-  callbacks.finish(context);
+  callbacks.finish(context, film);
   if (!options.preview_path.empty()) write_preview(options.preview_path, film);
   stats.peak_bytes = peak_memory_bytes();
   callbacks.collect(stats);

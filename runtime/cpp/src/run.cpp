@@ -3,11 +3,13 @@
 #include <cmath>
 #include <glm/common.hpp>
 
+#include "ln/exr_film.hpp"
 #include "ln/gltf.hpp"
 #include "ln/image_reader.hpp"
 #include "ln/progress.hpp"
 #include "ln/stats.hpp"
 #include "ln/text.hpp"
+#include "ln/texture.hpp"
 
 namespace ln {
 
@@ -41,8 +43,11 @@ Camera choose_camera(const SceneData& data, const std::string& wanted) {
 
 bool has_emitter(const SceneData& data) {
   if (!data.lights.empty()) return true;
-  for (const Part& part : data.parts)
-    if (part.triangle_count > 0 && data.materials[part.material].emits()) return true;
+  for (const Part& part : data.parts) {
+    const Material& m = data.materials[part.material];
+    if (part.triangle_count == 0 || !m.emits()) continue;
+    if (!m.emissive_texture || max_component(m.emission * Color(color_range(data.images[m.emissive_texture.image]).high)) > 0) return true;
+  }
   return false;
 }
 
@@ -114,6 +119,22 @@ void NetworkRun::build(RunContext& context) {
 void NetworkRun::prepare(RunContext& context) {
   PrepareStep step(*prepare_context_, context, prepare_seconds_);
   prepare_network(step);
+}
+
+void NetworkRun::finish(RunContext&, const Film& film) {
+  for (std::size_t i = 0; i < program_.layers.size(); ++i) {
+    const LayerInfo& layer = program_.layers[i];
+    if (!layer.file) continue;
+    std::vector<float> rgb;
+    rgb.reserve(static_cast<std::size_t>(film.width()) * static_cast<std::size_t>(film.height()) * 3);
+    for (int y = 0; y < film.height(); ++y) {
+      for (int x = 0; x < film.width(); ++x) {
+        const Color c = film.mean(x, y, static_cast<int>(i));
+        rgb.insert(rgb.end(), {c.x, c.y, c.z});
+      }
+    }
+    write_exr(layer.file, film.width(), film.height(), rgb.data(), {{"network", program_.network}, {"lightPaths", layer.light_paths}});
+  }
 }
 
 void NetworkRun::collect(Stats& stats) {

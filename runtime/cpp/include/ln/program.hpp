@@ -52,6 +52,7 @@ struct NodeInfo {
 struct LayerInfo {
   const char* name;
   const char* light_paths = "";
+  const char* file = nullptr;  // a tap: a picture of its own instead of a layer
 };
 
 struct ProgramInfo {
@@ -88,7 +89,7 @@ class RunCallbacks {
   /// between two samples of a pixel, when tile.stopped().
   virtual void render_tile(const Tile& tile, Film& film) = 0;
   /// After the picture is written: wire taps. Called after an interrupt too.
-  virtual void finish(RunContext&) {}
+  virtual void finish(RunContext&, const Film&) {}
   /// Fills scene, rays and nodes; seconds, samples and peak_bytes are filled already.
   virtual void collect(Stats& stats) = 0;
 };

@@ -44,6 +44,7 @@ class NetworkRun : public RunCallbacks {
   PictureSize load(RunContext& context) override;
   void build(RunContext& context) override;
   void prepare(RunContext& context) override;
+  void finish(RunContext& context, const Film& film) override;
   void collect(Stats& stats) override;
 
  protected:

@@ -1,0 +1,100 @@
+"""Whole programs: networks that carry the same light agree, pictures do not depend on threads, and the program costs little
+more than one written by hand."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import exr
+from conftest import ROOT, SCENES
+from lnc.build import BuildOptions, build_program
+from lnc.locations import library_folders
+
+SIZE = ("--size", "80x60")
+
+
+def block_means(image: np.ndarray, rows: int, columns: int) -> np.ndarray:
+    height, width, _ = image.shape
+    return image.reshape(rows, height // rows, columns, width // columns, 3).mean(axis=(1, 3, 4))
+
+
+def test_photon_density_agrees_with_path_tracing(compiled_network, run_program):
+    """In a closed diffuse box, at default settings: the mean within 1.5 %, corners and edges too within their noise."""
+    pictures = []
+    for network, samples in (("path_tracing", "512"), ("photon_density", "64")):
+        run = run_program(compiled_network(network), SCENES / "closed_box.gltf", *SIZE, "--samples", samples)
+        assert run.status == 0, run.stderr
+        pictures.append(exr.read(run.picture))
+    truth, found = pictures
+    assert found.mean() / truth.mean() == pytest.approx(1, rel=0.015)
+    np.testing.assert_allclose(block_means(found, 6, 8), block_means(truth, 6, 8), rtol=0.06)
+
+
+def test_caustics_add_light_where_photons_are_focused(compiled_network, run_program):
+    """Below the glass ball `caustics` is brighter than `direct`, elsewhere on the floor it is the same."""
+    pictures = []
+    for network in ("direct", "caustics"):
+        run = run_program(compiled_network(network), SCENES / "mirror_glass.glb", *SIZE, "--samples", "16")
+        assert run.status == 0, run.stderr
+        pictures.append(exr.read(run.picture))
+    gain = pictures[1] - pictures[0]
+    assert gain.min() > -0.5
+    assert gain.mean() > 0.01 * pictures[0].mean()
+
+
+@pytest.mark.parametrize(("network", "scene"), [("path_tracing", "glossy_tags.glb"), ("caustics", "mirror_glass.glb")])
+def test_threads_do_not_matter(compiled_network, run_program, network, scene):
+    """The same seed gives the same bytes with 1, 2 and 5 threads, another seed another picture."""
+    program = compiled_network(network)
+    files = {}
+    for threads, seed in ((1, 7), (2, 7), (5, 7), (2, 8)):
+        options = ("--threads", str(threads), "--seed", str(seed), "--set", "photons.count=20k") if network == "caustics" else (
+            "--threads", str(threads), "--seed", str(seed))
+        run = run_program(program, SCENES / scene, "--size", "40x30", "--samples", "6", *options)
+        assert run.status == 0, run.stderr
+        files[threads, seed] = run.picture.read_bytes()
+    assert files[1, 7] == files[2, 7] == files[5, 7]
+    assert files[2, 8] != files[2, 7]
+
+
+@pytest.fixture(scope="module")
+def monolith(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """benchmarks/monolith/path_tracing.cpp, compiled as networks are."""
+    program = tmp_path_factory.mktemp("monolith") / "path_tracing"
+    cpp = (ROOT / "benchmarks" / "monolith" / "path_tracing.cpp").read_text()
+    build_program(cpp, library_folders(()), program, BuildOptions(), quiet=True)
+    return program
+
+
+@pytest.mark.parametrize("scene", ["cornell_box.gltf", "glossy_tags.glb"])
+def test_the_monolith_computes_the_same(compiled_network, run_program, monolith, scene):
+    """Same rays, same picture up to rounding."""
+    options = ("--size", "40x30", "--samples", "8", "--threads", "1")
+    by_hand = run_program(monolith, SCENES / scene, *options)
+    expected, rays = exr.read(by_hand.picture), by_hand.stats["rays"]
+    run = run_program(compiled_network("path_tracing"), SCENES / scene, *options)
+    found = exr.read(run.picture)
+    assert found.mean() == pytest.approx(expected.mean(), rel=1e-4)
+    assert (np.abs(found - expected) <= 1e-3 * expected + 1e-5).mean() > 0.999
+    # A decision of the roulette may fall to the other side by rounding.
+    for kind, count in rays.items():
+        assert run.stats["rays"][kind] == pytest.approx(count, rel=1e-4), kind
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("valgrind") is None, reason="counts instructions with valgrind")
+def test_overhead_over_the_monolith(compiled_network, monolith, tmp_path):
+    """At most 5 % more instructions than the program by hand."""
+
+    def instructions(program: Path) -> int:
+        command = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={tmp_path / 'out'}", program, SCENES / "cornell_box.gltf"]
+        options = ["-o", tmp_path / "out.exr", "--size", "64x48", "--samples", "64", "--threads", "1", "--progress", "none"]
+        done = subprocess.run([*command, *options], capture_output=True, text=True, check=True)
+        return int(done.stderr.split("Collected :")[1].split()[0])
+
+    assert instructions(compiled_network("path_tracing")) <= 1.05 * instructions(monolith)

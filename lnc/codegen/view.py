@@ -65,6 +65,7 @@ class NodeView:
     fields: tuple[tuple[str, str], ...]
     inputs: tuple[InputView, ...]
     tables: tuple[TableView, ...]
+    receivers: str  # the tags that `to` restricts the wire to; empty: everywhere
     prepares: bool
     name: str
     op: str
@@ -166,9 +167,10 @@ class _Builder:
             type_name=f"ln::ops::{n.op.name}" + (f"<{arguments}>" if tables else ""),
             pull=self.pulls[n.identifier] if n.op.output == POINTS else "",
             constant=self.constants[n.identifier],
-            fields=tuple((p.name, self.field(n, p)) for p in n.parameters if not isinstance(p.value, PathValue)),
+            fields=tuple((p.name, self.field(n, p)) for p in n.parameters if not isinstance(p.value, PathValue) and p.name != "to"),
             inputs=tuple(argument for i in n.inputs for argument in self.arguments(n, i)),
             tables=tables,
+            receivers="" if n.receivers is None else self.tag_set(n.receivers),
             prepares=n.prepares,
             name=n.name,
             op=n.op.name,
@@ -183,7 +185,7 @@ class _Builder:
         value = p.value
         kind = p.declaration.type
         if kind == "tags":
-            return "ln::kAnyTag" if value is None else f"ln::TagSet{{1}} << {self.tag_bits[str(value)]}"
+            return "ln::kAnyTag" if value is None else self.tag_set(str(value))
         if kind == "text" and p.name == "layer":
             return str(self.layer(str(value), n.name))
         if kind == "text":
@@ -195,6 +197,9 @@ class _Builder:
         if not isinstance(value, int | float):
             raise InternalError(f"parameter {n.name}.{p.name} has the value {value!r}")
         return str(int(value)) if kind == "count" else float_literal(value)
+
+    def tag_set(self, tag: str) -> str:
+        return f"ln::TagSet{{1}} << {self.tag_bits[tag]}"
 
     def layer(self, name: str, wire: str) -> int:
         """Number of the layer called `name`, a new one."""

@@ -7,11 +7,9 @@ namespace ln::ops {
 /// Light of all terms together; see sum.ln.
 struct Sum {
   NodeId node;
-  TagSet to = kAnyTag;
 
   template <class Request, class... Terms>
   LN_INLINE Color answer(Request& request, const Terms&... terms) const {
-    if (!reaches(request, to)) return Color(0);
     Color sum(0);
     ((sum += terms(request)), ...);  // in the order of the text: same input, same bits
     return sum;

@@ -11,7 +11,6 @@ struct NNDensity {
   std::int64_t neighbours = 60;
   float radius = 0;         // [m]; 0: automatic
   std::int32_t kernel = 1;  // choice(constant, cone)
-  TagSet to = kAnyTag;
 
   void prepare(PrepareContext& context, const PhotonMap& map) {
     const auto unit = static_cast<float>(context.scene().data().unit);
@@ -22,7 +21,7 @@ struct NNDensity {
   Color answer(Request& request, const PhotonMap& map) const {
     if constexpr (!any(Request::receives & Events::D)) return Color(0);
     const Interaction& at = request.at();
-    if (map.empty() || !any(at.bsdf().events() & Events::D) || !reaches(request, to)) return Color(0);
+    if (map.empty() || !any(at.bsdf().events() & Events::D)) return Color(0);
     const Neighbourhood around{at.at.p, at.front ? at.at.ng : -at.at.ng, at.front};
     return request.scatter_irradiance(density_.irradiance(around));
   }

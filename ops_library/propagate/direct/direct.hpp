@@ -8,11 +8,10 @@ namespace ln::ops {
 struct Direct {
   NodeId node;
   std::int64_t samples = 1;
-  TagSet to = kAnyTag;
 
   template <class Request>
   LN_INLINE Color answer(Request& request, const Emitters& light) const {
-    if (!reaches(request, to) || light.empty()) return Color(0);
+    if (light.empty()) return Color(0);
     Color result(0);
     if (request.takes_samples()) result += sample_emitters(request, light);
     if (light.has_area()) result += emission_on_bsdf_ray(request, light);

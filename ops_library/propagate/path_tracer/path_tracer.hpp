@@ -9,11 +9,10 @@ template <class Via>
 struct PathTracer {
   NodeId node;
   std::int64_t max_depth = 0;
-  TagSet from = kAnyTag, to = kAnyTag;
+  TagSet from = kAnyTag;
 
   template <class Request, class In>
   LN_INLINE Color answer(Request& request, const In& in) const {
-    if (!reaches(request, to)) return Color(0);
     if (max_depth > 0 && request.depth() >= static_cast<std::uint64_t>(max_depth)) return Color(0);
     const BsdfRay* ray = request.bsdf_ray(node);
     if (!ray || !ray->hit.found()) return Color(0);

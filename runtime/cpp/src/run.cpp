@@ -1,7 +1,9 @@
 #include "ln/run.hpp"
 
+#include <chrono>
 #include <cmath>
 #include <glm/common.hpp>
+#include <numeric>
 
 #include "ln/exr_film.hpp"
 #include "ln/gltf.hpp"
@@ -84,6 +86,30 @@ void PrepareStep::operator()(NodeId node, FunctionRef<void(PrepareContext&)> wor
   seconds_[node] += watch.seconds();
 }
 
+NodeSampler::NodeSampler(const std::vector<Tracer>& tracers, std::size_t node_count) : seen_(node_count) {
+  thread_ = std::thread([this, &tracers] {
+    while (!stop_.load(std::memory_order_relaxed)) {
+      for (const Tracer& tracer : tracers)
+        if (const NodeId node = tracer.present_node(); node < seen_.size()) ++seen_[node];
+      std::this_thread::sleep_for(std::chrono::microseconds(500));
+    }
+  });
+}
+
+NodeSampler::~NodeSampler() {
+  stop_ = true;
+  if (thread_.joinable()) thread_.join();
+}
+
+std::vector<double> NodeSampler::shares() {
+  stop_ = true;
+  if (thread_.joinable()) thread_.join();
+  const double all = std::accumulate(seen_.begin(), seen_.end(), 0.0);
+  std::vector<double> shares(seen_.size());
+  for (std::size_t i = 0; i < seen_.size() && all > 0; ++i) shares[i] = static_cast<double>(seen_[i]) / all;
+  return shares;
+}
+
 PictureSize NetworkRun::load(RunContext& context) {
   const Options& options = context.options;
   scene_file_ = options.scene;
@@ -119,6 +145,7 @@ void NetworkRun::build(RunContext& context) {
 void NetworkRun::prepare(RunContext& context) {
   PrepareStep step(*prepare_context_, context, prepare_seconds_);
   prepare_network(step);
+  sampler_.emplace(tracers_, program_.nodes.size());
 }
 
 void NetworkRun::finish(RunContext&, const Film& film) {
@@ -146,8 +173,7 @@ void NetworkRun::collect(Stats& stats) {
   if (prepare_context_) add(prepare_context_->tracers());
   add(tracers_);
 
-  std::uint64_t ticks = 0;
-  for (const NodeCost& cost : costs) ticks += cost.ticks;
+  const std::vector<double> shares = sampler_ ? sampler_->shares() : std::vector<double>(costs.size());
   for (std::size_t i = 0; i < costs.size(); ++i) {
     const auto& rays = costs[i].rays;
     RayCounts sum{rays[0], rays[1], rays[2], rays[3], rays[0] + rays[1] + rays[2] + rays[3]};
@@ -156,8 +182,7 @@ void NetworkRun::collect(Stats& stats) {
     node.name = program_.nodes[i].name;
     node.op = program_.nodes[i].op;
     node.rays = sum.total;
-    const double share = ticks > 0 ? static_cast<double>(costs[i].ticks) / static_cast<double>(ticks) : 0;
-    node.seconds = (prepare_seconds_.empty() ? 0 : prepare_seconds_[i]) + share * stats.seconds.render;
+    node.seconds = (prepare_seconds_.empty() ? 0 : prepare_seconds_[i]) + shares[i] * stats.seconds.render;
     stats.nodes.push_back(std::move(node));
   }
   stats.scene_file = scene_file_;

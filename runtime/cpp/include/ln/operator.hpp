@@ -19,7 +19,8 @@
 
 namespace ln {
 
-/// Is the request at a surface with one of the tags `to`?
+/// Is the request at a surface with one of the tags `to`? Generated programs ask it for the parameter `to`, which no operator
+/// sees itself.
 template <class Request>
 bool reaches(Request& request, TagSet to) {
   return to == kAnyTag || (request.tracer().scene().part_tags(request.at().part) & to);

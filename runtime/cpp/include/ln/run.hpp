@@ -6,8 +6,10 @@
 //   Color image(Request&) const                  what the eye gets from a surface point; a template
 //   std::span<const ParameterSlot> parameters()  and the other tables of ProgramInfo
 
+#include <atomic>
 #include <memory>
 #include <optional>
+#include <thread>
 #include <vector>
 
 #include "ln/camera.hpp"
@@ -34,6 +36,21 @@ class PrepareStep {
   PrepareContext& context_;
   RunContext& run_;
   std::vector<double>& seconds_;
+};
+
+/// Watches, from a thread of its own, which node each tracer is at, and so shares out the time of the picture.
+class NodeSampler {
+ public:
+  NodeSampler(const std::vector<Tracer>& tracers, std::size_t node_count);
+  ~NodeSampler();
+
+  /// Ends the watch. The share of the busy time that each node has had, without the nodes that it asked.
+  std::vector<double> shares();
+
+ private:
+  std::vector<std::uint64_t> seen_;  // by node
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
 };
 
 /// Everything of a run that needs no knowledge of the network's type.
@@ -69,6 +86,7 @@ class NetworkRun : public RunCallbacks {
   std::optional<PrepareContext> prepare_context_;
   std::vector<double> prepare_seconds_;
   std::vector<Tracer> tracers_;
+  std::optional<NodeSampler> sampler_;
   std::uint32_t seed_hash_ = 0;
 };
 
@@ -130,20 +148,21 @@ class NetworkProgram final : public NetworkRun {
     Tracer& tracer = this->tracer(tile.worker);
     for (int y = tile.y0; y < tile.y1; ++y) {
       for (int x = tile.x0; x < tile.x1; ++x) {
-        if (tile.stopped()) return;
+        if (tile.stopped()) break;
         const std::uint32_t key = hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)), seed_hash());
-        for_samples(key, tile, tracer, [&](const SampleStream& random) { render_sample(x, y, key, random, tracer, film); });
+        for_samples(key, tile, tracer, [&](const SampleStream& random) { render_sample(x, y, random, tracer, film); });
       }
     }
+    tracer.enter(Tracer::kIdle);
   }
 
  protected:
   void prepare_network(PrepareStep& step) override { network_.prepare(step); }
 
  private:
-  void render_sample(int x, int y, std::uint32_t key, const SampleStream& random, Tracer& tracer, Film& film) {
+  void render_sample(int x, int y, const SampleStream& random, Tracer& tracer, Film& film) {
     const std::uint32_t sample = random.index();
-    const SampleTimer timer(tracer, key + sample);
+    tracer.enter(kEye);
     const Vec2 pixel = Vec2(static_cast<float>(x), static_cast<float>(y)) + random.get2(0, kPixel);
     film.add(x, y, sample, eye_radiance(network_, tracer, camera().ray(pixel), random));
     for (std::size_t layer = 0; layer < layer_count_; ++layer) {

@@ -1,5 +1,5 @@
 #pragma once
-// One thread's access to the scene: casts rays, and counts and times them for their nodes.
+// One thread's access to the scene: casts rays and counts them for their nodes.
 
 #include <array>
 #include <memory>
@@ -21,27 +21,12 @@ using NodeId = std::uint16_t;
 /// What a node has cost a thread.
 struct NodeCost {
   std::array<std::uint64_t, kRayKinds> rays{};
-  std::uint64_t ticks = 0;  // of the samples that are timed, without the nodes it asked
 
   NodeCost& operator+=(const NodeCost& other) {
     for (int k = 0; k < kRayKinds; ++k) rays[k] += other.rays[k];
-    ticks += other.ticks;
     return *this;
   }
 };
-
-/// The processor's clock; only ratios of differences mean something.
-inline std::uint64_t clock_ticks() {
-#if defined(__x86_64__)
-  return __builtin_ia32_rdtsc();
-#elif defined(__aarch64__)
-  std::uint64_t t;
-  asm volatile("mrs %0, cntvct_el0" : "=r"(t));
-  return t;
-#else
-  return 0;
-#endif
-}
 
 class Tracer {
  public:
@@ -65,70 +50,20 @@ class Tracer {
   /// Values of the picture's layers for the sample being computed.
   std::vector<Color>& layers() { return layers_; }
 
+  /// Says which node works from now on, for whoever samples `present_node`: one store.
+  void enter(NodeId node) { __atomic_store_n(&present_node_, node, __ATOMIC_RELAXED); }
+  NodeId present_node() const { return __atomic_load_n(&present_node_, __ATOMIC_RELAXED); }
+  static constexpr NodeId kIdle = 0xffff;
+
   /// Scratch for random numbers.
   SampleBlock& samples() { return *samples_; }
 
  private:
-  friend class NodeTimer;
-  friend class SampleTimer;
-
   const Scene* scene_;
   std::vector<NodeCost> costs_;
   std::vector<Color> layers_;
   std::unique_ptr<SampleBlock> samples_ = std::make_unique<SampleBlock>();
-  bool timed_ = false;         // is the present sample timed?
-  NodeId timed_node_ = 0;      // the node at work
-  std::uint64_t since_ = 0;    // when it began or went on
-};
-
-/// Charges the time from here to the end of the scope to a node, in samples that are timed.
-class NodeTimer {
- public:
-  NodeTimer(Tracer& tracer, NodeId node) : tracer_(tracer) {
-    if (tracer.timed_) [[unlikely]] {
-      caller_ = tracer.timed_node_;
-      switch_to(node);
-    }
-  }
-  ~NodeTimer() {
-    if (tracer_.timed_) [[unlikely]] switch_to(caller_);
-  }
-  NodeTimer(const NodeTimer&) = delete;
-  NodeTimer& operator=(const NodeTimer&) = delete;
-
- private:
-  void switch_to(NodeId node) {
-    const std::uint64_t now = clock_ticks();
-    tracer_.costs_[tracer_.timed_node_].ticks += now - tracer_.since_;
-    tracer_.timed_node_ = node;
-    tracer_.since_ = now;
-  }
-
-  Tracer& tracer_;
-  NodeId caller_ = 0;
-};
-
-/// Times one sample out of many, chosen by a hash: enough to share out the time of the picture among the nodes.
-class SampleTimer {
- public:
-  static constexpr std::uint32_t kOneIn = 128;
-
-  SampleTimer(Tracer& tracer, std::uint32_t hash) : tracer_(tracer) {
-    tracer.timed_ = hash % kOneIn == 0;
-    if (tracer.timed_) {
-      tracer.timed_node_ = 0;
-      tracer.since_ = clock_ticks();
-    }
-  }
-  ~SampleTimer() {
-    if (tracer_.timed_) tracer_.costs_[tracer_.timed_node_].ticks += clock_ticks() - tracer_.since_;
-    tracer_.timed_ = false;
-  }
-  SampleTimer(const SampleTimer&) = delete;
-  SampleTimer& operator=(const SampleTimer&) = delete;
-
- private:
-  Tracer& tracer_;
+  NodeId present_node_ = kIdle;
 };
 
 }  // namespace ln

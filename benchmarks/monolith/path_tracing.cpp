@@ -63,10 +63,12 @@ class PathTracing final : public NetworkRun {
       beta *= at.transmittance;
 
       // Russian roulette.
-      if (!seen && depth >= 2) {
-        const float survival = std::min(max_component(beta), 0.95f);
-        if (random.get1(depth, kRoulette) >= survival) return result;
-        beta /= survival;
+      if (!seen) {
+        const float survival = survival_probability(beta, depth);
+        if (survival < 1) {
+          if (random.get1(depth, kRoulette) >= survival) return result;
+          beta /= survival;
+        }
       }
 
       const std::uint32_t vertex = depth + 1;

@@ -40,13 +40,6 @@ struct PathTracer {
     ln::Request<kVia> next(tracer, random, at, beta * weight, depth + 1, RayKind::gather);
     return weight * in(next);
   }
-
-  /// Russian roulette: paths go on with the share of light that they still carry.
-  static float survival_probability(const Color& beta, std::uint32_t depth) {
-    constexpr std::uint32_t kFirst = 2;
-    if (depth < kFirst) return 1;
-    return std::min(max_component(beta), 0.95f);
-  }
 };
 
 }  // namespace ln::ops

@@ -109,6 +109,13 @@ class Request {
   };
 };
 
+/// Russian roulette at the surface with `depth` surfaces between it and the eye: the probability with which a path goes on that
+/// still carries the share `beta` of the light. Early ends are dear where the light is behind them, late ones cost rays.
+inline float survival_probability(const Color& beta, std::uint32_t depth) {
+  constexpr std::uint32_t kFirst = 4;
+  return depth < kFirst ? 1.0f : std::min(max_component(beta), 0.95f);
+}
+
 /// Weight of a technique of density `a` beside one of density `b` for the same light (power heuristic; Veach 1997, eq. 9.14).
 inline float mis_weight(float a, float b) {
   const float r = b / a;

@@ -39,7 +39,9 @@ class Runtime:
     link_flags: tuple[str, ...]
 
 
-def build_program(cpp: str, include_folders: Iterable[Path], output: Path, options: BuildOptions, quiet: bool = False) -> None:
+def build_program(
+    cpp: str, include_folders: Iterable[Path], output: Path, options: BuildOptions, quiet: bool = False
+) -> None:
     """Compiles a network's C++ text into the program `output`. Raises BuildError.
 
     `include_folders`: the operator libraries whose headers the text includes. The program is taken from the cache if
@@ -83,7 +85,11 @@ def build_runtime(options: BuildOptions, quiet: bool = False) -> Runtime:
         with _lock(folder / "lock"):
             if _text_of(done) != key:
                 if not quiet:
-                    again = " again: its sources have changed" if done.exists() else " (once for this machine; some two minutes)"
+                    again = (
+                        " again: its sources have changed"
+                        if done.exists()
+                        else " (once for this machine; some two minutes)"
+                    )
                     print(f"lnc: building the runtime library{again}", file=sys.stderr, flush=True)
                 _cmake(root, folder, options)
                 done.write_text(key)
@@ -102,7 +108,10 @@ def _cmake(root: Path, folder: Path, options: BuildOptions) -> None:
         raise BuildError("cmake is not installed; 'lnc doctor' lists what is needed")
     generator = ["-G", "Ninja"] if shutil.which("ninja") else []
     portable = "ON" if options.portable else "OFF"
-    _run(["cmake", "-S", str(root), "-B", str(folder), *generator, f"-DLN_PORTABLE={portable}"], "configuring the runtime library")
+    _run(
+        ["cmake", "-S", str(root), "-B", str(folder), *generator, f"-DLN_PORTABLE={portable}"],
+        "configuring the runtime library",
+    )
     jobs = str(len(os.sched_getaffinity(0)))
     _run(["cmake", "--build", str(folder), "--target", "ln_runtime", "-j", jobs], "building the runtime library")
 
@@ -115,7 +124,16 @@ def _compile(cpp: str, folders: tuple[Path, ...], runtime: Runtime, program: Pat
         includes = [f"-I{folder}" for folder in folders]
         # The same text gives the same bytes wherever the cache lies.
         prefix = f"-ffile-prefix-map={scratch}=."
-        command = [runtime.compiler, *runtime.compile_flags, *includes, prefix, str(source), "-o", str(built), *runtime.link_flags]
+        command = [
+            runtime.compiler,
+            *runtime.compile_flags,
+            *includes,
+            prefix,
+            str(source),
+            "-o",
+            str(built),
+            *runtime.link_flags,
+        ]
         _run(command, "compiling the network")
         os.replace(built, program)
 
@@ -156,7 +174,9 @@ def _read_flags(key: str, folder: Path) -> Runtime:
 
 def _run(command: list[str], what: str) -> None:
     try:
-        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", check=False)
+        done = subprocess.run(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace", check=False
+        )
     except OSError as error:
         raise BuildError(f"{what}: cannot run {command[0]}: {error.strerror}") from error
     if done.returncode != 0:
@@ -169,7 +189,9 @@ def _writable_cache() -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BuildError(f"{folder}: cannot make the cache folder: {error.strerror}; set LNC_CACHE to another") from error
+        raise BuildError(
+            f"{folder}: cannot make the cache folder: {error.strerror}; set LNC_CACHE to another"
+        ) from error
     if not os.access(folder, os.W_OK | os.X_OK):
         raise BuildError(f"{folder}: the cache folder cannot be written; set LNC_CACHE to another")
     return folder
@@ -193,7 +215,11 @@ def _digest(parts: Iterable[str]) -> str:
 
 def _tree_digest(folder: Path, endings: tuple[str, ...]) -> str:
     files = sorted(p for p in folder.rglob("*") if p.suffix in endings and "tests" not in p.relative_to(folder).parts)
-    return _digest(text for p in files for text in (p.relative_to(folder).as_posix(), p.read_text(encoding="utf-8", errors="surrogateescape")))
+    return _digest(
+        text
+        for p in files
+        for text in (p.relative_to(folder).as_posix(), p.read_text(encoding="utf-8", errors="surrogateescape"))
+    )
 
 
 def _compiler_identity(compiler: str) -> str:

@@ -42,7 +42,7 @@ def compile_command(arguments: argparse.Namespace) -> int:
 
 
 def run_command(arguments: argparse.Namespace) -> int:
-    """`lnc run FILE SCENE [program options]`: becomes the program."""
+    """`lnc run FILE SCENE [program options]`: becomes the program, unless that cannot be made."""
     result, status = _read(arguments)
     if result is None or status != FINE or result.schedule is None:
         return status
@@ -53,10 +53,10 @@ def run_command(arguments: argparse.Namespace) -> int:
     except BuildError as error:
         return fail(str(error))
     status = _build(cpp, arguments, program)
-    if status != FINE:
-        return status
-    sys.stdout.flush()
-    os.execv(program, [str(program), arguments.scene, *arguments.rest])
+    if status == FINE:
+        sys.stdout.flush()
+        os.execv(program, [str(program), arguments.scene, *arguments.rest])
+    return status
 
 
 def write_cpp(result: Result) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 # Members of the generated struct, and names that its functions use.
@@ -40,7 +41,7 @@ def comment_text(text: str) -> str:
 
 def float_literal(value: float) -> str:
     """A float literal that has the value exactly as near as a float can."""
-    if value != value or value in (float("inf"), float("-inf")):
+    if not math.isfinite(value):
         raise ValueError(f"no literal for {value}")
     text = repr(float(value))
     return text + "f"

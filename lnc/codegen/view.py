@@ -167,7 +167,11 @@ class _Builder:
             type_name=f"ln::ops::{n.op.name}" + (f"<{arguments}>" if tables else ""),
             pull=self.pulls[n.identifier] if n.op.output == POINTS else "",
             constant=self.constants[n.identifier],
-            fields=tuple((p.name, self.field(n, p)) for p in n.parameters if not isinstance(p.value, PathValue) and p.name != "to"),
+            fields=tuple(
+                (p.name, self.field(n, p))
+                for p in n.parameters
+                if not isinstance(p.value, PathValue) and p.name != "to"
+            ),
             inputs=tuple(argument for i in n.inputs for argument in self.arguments(n, i)),
             tables=tables,
             receivers="" if n.receivers is None else self.tag_set(n.receivers),

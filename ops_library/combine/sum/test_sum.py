@@ -28,7 +28,11 @@ def picture(compiled_network, run_program, name, image):
 def test_sum_of_terms(compiled_network, run_program):
     once = picture(compiled_network, run_program, "once", "direct")
     assert once.min() > 0
-    for name, image in (("op", "total"), ("plus", "direct + third"), ("nested", "Sum(direct, direct) + Sum(direct, direct)")):
+    for name, image in (
+        ("op", "total"),
+        ("plus", "direct + third"),
+        ("nested", "Sum(direct, direct) + Sum(direct, direct)"),
+    ):
         np.testing.assert_allclose(picture(compiled_network, run_program, name, image), once * 4, rtol=1e-6)
 
 

@@ -30,14 +30,18 @@ def test_furnace(compiled_network, run_program):
 
 def test_bounded_depth_is_a_partial_sum(compiled_network, run_program):
     """Two scattering events in the furnace: 1 + rho + rho^2."""
-    run = run_program(compiled_network("once", text=ONCE), SCENES / "furnace.gltf", "--size", "20x15", "--samples", "64")
+    run = run_program(
+        compiled_network("once", text=ONCE), SCENES / "furnace.gltf", "--size", "20x15", "--samples", "64"
+    )
     assert run.status == 0, run.stderr
     assert exr.read(run.picture).mean() == pytest.approx(1.75, rel=2e-3)
 
 
 def test_no_ray_is_traced_twice(compiled_network, run_program):
     """One light sample and one BSDF sample a surface: Direct and PathTracer share the ray of the latter."""
-    run = run_program(compiled_network("path_tracing"), SCENES / "closed_box.gltf", "--size", "20x15", "--samples", "16")
+    run = run_program(
+        compiled_network("path_tracing"), SCENES / "closed_box.gltf", "--size", "20x15", "--samples", "16"
+    )
     assert run.status == 0, run.stderr
     rays = {node["name"]: node["rays"] for node in run.stats["nodes"]}
     assert rays["image"] == run.stats["rays"]["camera"] == 20 * 15 * 16

@@ -1,4 +1,4 @@
-"""From C++ text to a program: builds the runtime once per machine and each network once, in a cache keyed by content."""
+"""From C++ text to a program: the runtime is built once per machine, each network once; a cache is keyed by content."""
 
 from __future__ import annotations
 

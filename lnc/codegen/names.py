@@ -36,7 +36,7 @@ def cpp_string(text: str) -> str:
 def comment_text(text: str) -> str:
     """Text for a `//` comment: one line, and no backslash at its end that would continue the comment."""
     line = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text).rstrip()
-    return line + " ." if line.endswith("\\") or line.endswith("??/") else line
+    return line + " ." if line.endswith(("\\", "??/")) else line
 
 
 def float_literal(value: float) -> str:

@@ -20,7 +20,7 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def data_root() -> Path:
-    """Holds `ops_library`, `runtime`, `examples` and `CMakeLists.txt`: the checkout, or the wheel's data."""
+    """Holds `ops_library`, `runtime` and `CMakeLists.txt`: the checkout, or the wheel's data."""
     installed = _PACKAGE / "_data"
     return installed if installed.is_dir() else _PACKAGE.parent
 

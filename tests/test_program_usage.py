@@ -123,7 +123,12 @@ def test_scenes_that_cannot_be_read(program: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("option", ["-o", "--stats"])
 @pytest.mark.parametrize(
     ("name", "part"),
-    [("none/a.exr", "there is no folder"), (".", "this is a folder"), ("file/a.exr", "not a folder"), ("/dev/full", "No space left")],
+    [
+        ("none/a.exr", "there is no folder"),
+        (".", "this is a folder"),
+        ("file/a.exr", "not a folder"),
+        ("/dev/full", "No space left"),
+    ],
 )
 def test_outputs_that_cannot_be_written(program: Path, tmp_path: Path, option: str, name: str, part: str) -> None:
     (tmp_path / "file").write_text("old")

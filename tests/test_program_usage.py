@@ -152,13 +152,7 @@ def test_names_cannot_steer_the_terminal(program: Path, tmp_path: Path) -> None:
 
 def test_interrupt_writes_the_picture(program: Path, tmp_path: Path) -> None:
     command = [str(program), str(BOX), "--samples", "1G", "--size", "200x120", "--progress", "json"]
-
-    def heed_interrupts() -> None:  # a shell's background job ignores them, and programs keep to that
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-    with subprocess.Popen(
-        command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, preexec_fn=heed_interrupts
-    ) as process:
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         for line in process.stderr:
             if '"phase": "render"' in line:

@@ -151,7 +151,7 @@ def test_names_cannot_steer_the_terminal(program: Path, tmp_path: Path) -> None:
 
 
 def test_interrupt_writes_the_picture(program: Path, tmp_path: Path) -> None:
-    command = [str(program), str(BOX), "--samples", "1G", "--size", "200x120", "--progress", "json"]
+    command = [str(program), str(BOX), "--samples", "1G", "--time", "60", "--size", "200x120", "--progress", "json"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         for line in process.stderr:

@@ -22,10 +22,6 @@ SCENES = ROOT / "examples" / "scenes"
 FEW = 4  # tests that build what they need by themselves; more of them have everything built at once
 
 
-# What a shell starts in the background ignores interrupts, and so would every program that a test starts and interrupts.
-signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
 @dataclass(frozen=True)
 class Run:
     """A finished run of a program."""

@@ -53,22 +53,26 @@ void read(const void* bytes, std::size_t size, const char* format, ln::LnImageAl
   if (!input) throw std::runtime_error("there is no decoder for " + std::string(format) + ": " + OIIO::geterror());
   OIIO::ImageSpec config, spec;
   config.attribute("oiio:UnassociatedAlpha", 1);
-  if (!input->set_ioproxy(&file) || !input->open(std::string("image.") + format, spec, config)) throw std::runtime_error(input->geterror());
-  if (spec.width <= 0 || spec.height <= 0 || spec.depth > 1 || spec.nchannels <= 0) throw std::runtime_error("the image has no pixels");
+  if (!input->set_ioproxy(&file) || !input->open(std::string("image.") + format, spec, config))
+    throw std::runtime_error(input->geterror());
+  if (spec.width <= 0 || spec.height <= 0 || spec.depth > 1 || spec.nchannels <= 0)
+    throw std::runtime_error("the image has no pixels");
 
   const bool is_8_bit = spec.format.basetype == OIIO::TypeDesc::UINT8;
   const int kind = is_8_bit ? 0 : spec.format.is_floating_point() ? 1 : 2;
   const int channels = std::min(spec.nchannels, 4);
   void* pixels = allocate(context, spec.width, spec.height, channels, kind);
   if (pixels == nullptr) throw std::runtime_error("refused");
-  if (!input->read_image(0, 0, 0, channels, is_8_bit ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT, pixels)) throw std::runtime_error(input->geterror());
+  if (!input->read_image(0, 0, 0, channels, is_8_bit ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT, pixels))
+    throw std::runtime_error(input->geterror());
   input->close();
 }
 
 }  // namespace
 
-extern "C" __attribute__((visibility("default"))) int ln_image_read(const void* bytes, std::size_t size, const char* format, ln::LnImageAllocate allocate, void* context,
-                                                                    char* message, std::size_t message_size) {
+extern "C" __attribute__((visibility("default"))) int ln_image_read(const void* bytes, std::size_t size, const char* format,
+                                                                    ln::LnImageAllocate allocate, void* context, char* message,
+                                                                    std::size_t message_size) {
   try {
     static const bool limited = (set_limits(), true);
     (void)limited;

@@ -25,13 +25,15 @@ std::size_t element_size(int components, int columns, ComponentType type) {
 }
 
 /// The bytes of `count` elements in a buffer view; throws Error at `member` if they do not fit.
-ByteView place(const Model& model, Json at, std::string_view member, std::size_t view_index, std::uint64_t offset, std::uint64_t count, std::uint64_t stride, std::uint64_t element) {
+ByteView place(const Model& model, Json at, std::string_view member, std::size_t view_index, std::uint64_t offset,
+               std::uint64_t count, std::uint64_t stride, std::uint64_t element) {
   const ByteView view = model.view(view_index);
   std::uint64_t size = 0;
   const bool overflow = __builtin_mul_overflow(count - 1, stride, &size) || __builtin_add_overflow(size, element, &size);
   if (overflow || offset > view.size() || size > view.size() - offset) {
-    at.fail(member, number_text(static_cast<double>(count)) + " elements of " + std::to_string(element) + " bytes from byte " + std::to_string(offset) + " on do not fit bufferViews[" +
-                        std::to_string(view_index) + "] with its " + std::to_string(view.size()) + " bytes");
+    at.fail(member, number_text(static_cast<double>(count)) + " elements of " + std::to_string(element) + " bytes from byte " +
+                        std::to_string(offset) + " on do not fit bufferViews[" + std::to_string(view_index) + "] with its " +
+                        std::to_string(view.size()) + " bytes");
   }
   return ByteView(view.part(offset, size));
 }
@@ -45,7 +47,8 @@ Accessor::Accessor(const Model& model, Json json) : json_(json) {
   components_ = component_count(type());
   columns_ = column_count(type());
   element_bytes_ = element_size(components_, columns_, type_);
-  if (normalized_ && (type_ == ComponentType::f32 || type_ == ComponentType::u32)) json_.fail("normalized", "only 8 and 16 bit integers can be normalised");
+  if (normalized_ && (type_ == ComponentType::f32 || type_ == ComponentType::u32))
+    json_.fail("normalized", "only 8 and 16 bit integers can be normalised");
   place_dense(model);
   place_sparse(model);
 }
@@ -57,8 +60,11 @@ void Accessor::place_dense(const Model& model) {
   const auto view_index = view.index();
   const Json stride = model.buffer_views[view_index]["byteStride"];
   stride_ = static_cast<std::size_t>(stride.integer(static_cast<std::int64_t>(element_bytes_)));
-  if (stride_ < element_bytes_) stride.fail(std::to_string(stride_) + " is less than the " + std::to_string(element_bytes_) + " bytes of an element of " + json_.path());
-  dense_ = place(model, json_, "count", view_index, static_cast<std::uint64_t>(json_["byteOffset"].integer(0)), count_, stride_, element_bytes_);
+  if (stride_ < element_bytes_)
+    stride.fail(std::to_string(stride_) + " is less than the " + std::to_string(element_bytes_) + " bytes of an element of " +
+                json_.path());
+  dense_ = place(model, json_, "count", view_index, static_cast<std::uint64_t>(json_["byteOffset"].integer(0)), count_, stride_,
+                 element_bytes_);
 }
 
 void Accessor::place_sparse(const Model& model) {
@@ -68,11 +74,15 @@ void Accessor::place_sparse(const Model& model) {
   const auto offset_of = [](Json json) { return static_cast<std::uint64_t>(json["byteOffset"].integer(0)); };
   const Json indices = sparse["indices"], values = sparse["values"];
   sparse_count_ = sparse["count"].index();
-  if (sparse_count_ > count_) sparse.fail("count", std::to_string(sparse_count_) + " is more than the " + std::to_string(count_) + " elements of the accessor");
+  if (sparse_count_ > count_)
+    sparse.fail("count",
+                std::to_string(sparse_count_) + " is more than the " + std::to_string(count_) + " elements of the accessor");
   sparse_type_ = static_cast<ComponentType>(indices["componentType"].integer(0));
   const std::size_t index_bytes = component_bytes(sparse_type_);
-  sparse_indices_ = place(model, indices, "bufferView", view_of(indices), offset_of(indices), sparse_count_, index_bytes, index_bytes);
-  sparse_values_ = place(model, values, "bufferView", view_of(values), offset_of(values), sparse_count_, element_bytes_, element_bytes_);
+  sparse_indices_ =
+      place(model, indices, "bufferView", view_of(indices), offset_of(indices), sparse_count_, index_bytes, index_bytes);
+  sparse_values_ =
+      place(model, values, "bufferView", view_of(values), offset_of(values), sparse_count_, element_bytes_, element_bytes_);
 }
 
 std::uint64_t Accessor::sparse_index(std::size_t i) const {
@@ -122,7 +132,8 @@ void Accessor::read_as(const ByteView& bytes, std::size_t offset, double* out) c
   const std::size_t column_bytes = element_bytes_ / static_cast<std::size_t>(columns_);
   for (int column = 0; column < columns_; ++column) {
     for (int row = 0; row < rows; ++row) {
-      *out++ = static_cast<double>(element.load<T>(static_cast<std::size_t>(column) * column_bytes + static_cast<std::size_t>(row) * sizeof(T)));
+      *out++ = static_cast<double>(
+          element.load<T>(static_cast<std::size_t>(column) * column_bytes + static_cast<std::size_t>(row) * sizeof(T)));
     }
   }
   if (!normalized_) return;
@@ -135,7 +146,8 @@ void Accessor::check_sparse_order() const {
   for (std::size_t i = 0; i < sparse_count_; ++i) {
     const bool ascending = i == 0 || sparse_index(i) > sparse_index(i - 1);
     if (!ascending) json_["sparse"].fail("indices", "element " + std::to_string(i) + " is not above the one before it");
-    if (sparse_index(i) >= count_) json_["sparse"].fail("indices", "there is no element " + std::to_string(sparse_index(i)) + " to substitute");
+    if (sparse_index(i) >= count_)
+      json_["sparse"].fail("indices", "there is no element " + std::to_string(sparse_index(i)) + " to substitute");
   }
 }
 

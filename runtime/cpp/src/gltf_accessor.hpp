@@ -15,7 +15,9 @@ struct Model;
 
 enum class ComponentType : std::uint16_t { i8 = 5120, u8 = 5121, i16 = 5122, u16 = 5123, u32 = 5125, f32 = 5126 };
 constexpr std::size_t component_bytes(ComponentType type) {
-  return type == ComponentType::i8 || type == ComponentType::u8 ? 1 : type == ComponentType::i16 || type == ComponentType::u16 ? 2 : 4;
+  return type == ComponentType::i8 || type == ComponentType::u8     ? 1
+         : type == ComponentType::i16 || type == ComponentType::u16 ? 2
+                                                                    : 4;
 }
 
 /// The elements of an accessor; reads them one by one, in any order. An accessor without a buffer view reads as zeros.

@@ -55,7 +55,7 @@ class Descriptor {
 
 /// Says what `path` is if it is not a regular file.
 struct stat require_regular(int descriptor) {
-  struct stat status {};
+  struct stat status{};
   if (fstat(descriptor, &status) != 0) throw Error(std::strerror(errno));
   if (S_ISDIR(status.st_mode)) throw Error("is a folder, not a file");
   if (!S_ISREG(status.st_mode)) throw Error("is not a regular file");
@@ -188,7 +188,8 @@ constexpr std::array<std::int8_t, 256> make_base64_values() {
   std::array<std::int8_t, 256> values{};
   values.fill(-1);
   constexpr std::string_view kAlphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  for (std::size_t i = 0; i < kAlphabet.size(); ++i) values[static_cast<unsigned char>(kAlphabet[i])] = static_cast<std::int8_t>(i);
+  for (std::size_t i = 0; i < kAlphabet.size(); ++i)
+    values[static_cast<unsigned char>(kAlphabet[i])] = static_cast<std::int8_t>(i);
   return values;
 }
 constexpr auto kBase64Values = make_base64_values();
@@ -230,7 +231,8 @@ Bytes decode_data_uri(std::string_view uri, MemoryBudget& memory) {
   for (std::size_t at = header.find(';'); at != std::string_view::npos;) {
     const std::size_t next = header.find(';', at + 1);
     const std::string_view parameter = header.substr(at + 1, next - at - 1);
-    if (parameter.find('=') == std::string_view::npos) throw Error("is not a data URI: \"" + printable(header, 60) + "\" has a parameter without '='");
+    if (parameter.find('=') == std::string_view::npos)
+      throw Error("is not a data URI: \"" + printable(header, 60) + "\" has a parameter without '='");
     at = next;
   }
   if (is_base64) return decode_base64(data, memory);
@@ -261,8 +263,11 @@ Glb split_glb(const Bytes& file) {
   if (bytes.size() < kHeader) throw Error("is cut short: the GLB header is not complete");
   const std::uint32_t version = little_endian(bytes, 4), length = little_endian(bytes, 8);
   if (version != 2) throw Error("is a GLB file of version " + std::to_string(version) + "; only 2 is supported");
-  if (length > bytes.size()) throw Error("is cut short: the GLB header says " + std::to_string(length) + " bytes, the file has " + std::to_string(bytes.size()));
-  if (length < kHeader + kChunkHeader) throw Error("the GLB header says " + std::to_string(length) + " bytes, too few for any content");
+  if (length > bytes.size())
+    throw Error("is cut short: the GLB header says " + std::to_string(length) + " bytes, the file has " +
+                std::to_string(bytes.size()));
+  if (length < kHeader + kChunkHeader)
+    throw Error("the GLB header says " + std::to_string(length) + " bytes, too few for any content");
 
   Glb glb;
   glb.has_extra_data = length < bytes.size();
@@ -272,7 +277,9 @@ Glb split_glb(const Bytes& file) {
     if (bytes.size() - at < kChunkHeader) throw Error("the header of GLB chunk " + std::to_string(chunk) + " is cut short");
     const std::uint32_t size = little_endian(bytes, at), type = little_endian(bytes, at + 4);
     at += kChunkHeader;
-    if (size > bytes.size() - at) throw Error("GLB chunk " + std::to_string(chunk) + " says " + std::to_string(size) + " bytes, " + std::to_string(bytes.size() - at) + " are left");
+    if (size > bytes.size() - at)
+      throw Error("GLB chunk " + std::to_string(chunk) + " says " + std::to_string(size) + " bytes, " +
+                  std::to_string(bytes.size() - at) + " are left");
     const auto content = bytes.subspan(at, size);
     at += std::min<std::size_t>((static_cast<std::size_t>(size) + 3) / 4 * 4, bytes.size() - at);
     if (chunk == 0 && type != kJson) throw Error("the first GLB chunk is not JSON");

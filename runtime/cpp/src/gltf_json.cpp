@@ -105,7 +105,8 @@ class JsonBuilder {
     std::sort(ids_.begin(), ids_.end());
     const auto twice = std::adjacent_find(ids_.begin(), ids_.end());
     if (twice == ids_.end()) return;
-    throw Error(document_.file_ + ": the member \"" + printable(document_.keys_[*twice - 1], 60) + "\" occurs twice in one object");
+    throw Error(document_.file_ + ": the member \"" + printable(document_.keys_[*twice - 1], 60) +
+                "\" occurs twice in one object");
   }
 
   void index_members(std::uint32_t object) {
@@ -185,9 +186,13 @@ std::string_view Json::key() const {
   return key == 0 ? std::string_view{} : document_->keys_[key - 1];
 }
 
-double Json::number(double fallback) const { return *this && kind() == JsonKind::number ? document_->entries_[index_].number : fallback; }
+double Json::number(double fallback) const {
+  return *this && kind() == JsonKind::number ? document_->entries_[index_].number : fallback;
+}
 
-bool Json::boolean(bool fallback) const { return *this && kind() == JsonKind::boolean ? document_->entries_[index_].number != 0 : fallback; }
+bool Json::boolean(bool fallback) const {
+  return *this && kind() == JsonKind::boolean ? document_->entries_[index_].number != 0 : fallback;
+}
 
 std::string_view Json::text(std::string_view fallback) const {
   if (!*this || kind() != JsonKind::string) return fallback;

@@ -187,7 +187,8 @@ TextureRef MaterialReader::texture(Json info, bool srgb, UvSets& sets) {
   if (!info) return result;
   const Json json = model_.textures[info["index"].index()];
   if (!json["source"]) {
-    model_.notes.count("texture has no PNG or JPEG image and is ignored", "textures have no PNG or JPEG image and are ignored", 1);
+    model_.notes.count("texture has no PNG or JPEG image and is ignored", "textures have no PNG or JPEG image and are ignored",
+                       1);
     return result;
   }
   const Json transform = info["extensions"]["KHR_texture_transform"];

@@ -38,8 +38,8 @@ class MaterialReader {
 
   Model& model_;
   SceneData& scene_;
-  std::map<std::int64_t, std::uint32_t> used_;  // -1: the default material
-  std::map<std::pair<std::size_t, bool>, int> images_;                          // by index and encoding
+  std::map<std::int64_t, std::uint32_t> used_;                                 // -1: the default material
+  std::map<std::pair<std::size_t, bool>, int> images_;                         // by index and encoding
   std::map<std::tuple<const std::uint8_t*, std::size_t, bool>, int> decoded_;  // by the bytes of the file
   std::vector<UvSets> uv_sets_;
 };

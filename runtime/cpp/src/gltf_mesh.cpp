@@ -49,7 +49,9 @@ std::size_t triangle_count(std::int64_t mode, std::size_t corners) {
 /// Beyond this, coordinates are taken for garbage [the file's unit].
 constexpr double kLargestCoordinate = 1e30;
 
-bool is_usable(const DVec3& p) { return std::abs(p.x) <= kLargestCoordinate && std::abs(p.y) <= kLargestCoordinate && std::abs(p.z) <= kLargestCoordinate; }
+bool is_usable(const DVec3& p) {
+  return std::abs(p.x) <= kLargestCoordinate && std::abs(p.y) <= kLargestCoordinate && std::abs(p.z) <= kLargestCoordinate;
+}
 
 /// What normals are transformed by: the inverse transpose times the absolute determinant, defined for singular matrices too.
 glm::dmat3 normal_matrix(const glm::dmat3& m) {
@@ -65,12 +67,16 @@ Vec3 unit_or_zero(const DVec3& v) {
   return Vec3(scaled / std::sqrt(glm::dot(scaled, scaled)));
 }
 
-float finite_or(double x, float fallback) { return std::abs(x) <= std::numeric_limits<float>::max() ? static_cast<float>(x) : fallback; }
+float finite_or(double x, float fallback) {
+  return std::abs(x) <= std::numeric_limits<float>::max() ? static_cast<float>(x) : fallback;
+}
 
+/// Appends the attribute of the last vertex. Arrays stay empty until a part has the attribute.
 template <class T>
-void append(std::vector<T>& values, std::size_t count_before, bool present, const T& value, const T& absent) {
+void append(std::vector<T>& values, const std::vector<DVec3>& vertices, bool present, const T& value, const T& absent) {
   if (!present && values.empty()) return;
-  if (values.size() < count_before) values.resize(count_before, absent);
+  if (values.empty()) values.reserve(vertices.capacity());
+  if (values.size() + 1 < vertices.size()) values.resize(vertices.size() - 1, absent);
   values.push_back(present ? value : absent);
 }
 
@@ -79,6 +85,7 @@ void append(std::vector<T>& values, std::size_t count_before, bool present, cons
 // ---------------------------------------------------------------- measuring
 
 MeshSize MeshWriter::measure(Json mesh) const {
+  constexpr double kScratchPerVertex = 8, kScratchPerTriangle = 24;  // what the search for duplicates takes
   MeshSize size;
   for (const Json primitive : mesh["primitives"]) {
     const Json position = primitive["attributes"]["POSITION"], indices = primitive["indices"];
@@ -89,15 +96,26 @@ MeshSize MeshWriter::measure(Json mesh) const {
     for (const Json target : primitive["targets"]) require_count(target, vertices);
     const auto triangles = static_cast<double>(triangle_count(primitive["mode"].integer(kTriangles), corners));
     const auto used = triangles == 0 ? 0.0 : static_cast<double>(std::min(vertices, corners));
-    double vertex_bytes = sizeof(DVec3) + sizeof(Vec3);
+    double vertex_bytes = sizeof(DVec3) + sizeof(Vec3) + kScratchPerVertex;
     for (const Json attribute : primitive["attributes"]) {
       const std::string_view name = attribute.key();
-      vertex_bytes += name == "NORMAL" ? sizeof(Vec3) : name == "TANGENT" || name == "COLOR_0" ? sizeof(Vec4) : name.starts_with("TEXCOORD_") ? sizeof(Vec2) : 0;
+      vertex_bytes += name == "NORMAL"                         ? sizeof(Vec3)
+                      : name == "TANGENT" || name == "COLOR_0" ? sizeof(Vec4)
+                      : name.starts_with("TEXCOORD_")          ? sizeof(Vec2)
+                                                               : 0;
     }
     size.triangles += triangles;
-    if (triangles > 0) size.bytes += sizeof(Part) + triangles * (sizeof(UVec3) + sizeof(std::uint32_t)) + used * vertex_bytes;
+    size.vertices += used;
+    if (triangles == 0) continue;
+    size.bytes += sizeof(Part) + triangles * (sizeof(UVec3) + sizeof(std::uint32_t) + kScratchPerTriangle) + used * vertex_bytes;
   }
   return size;
+}
+
+void MeshWriter::reserve(const MeshSize& size) {
+  scene_.triangles.reserve(static_cast<std::size_t>(size.triangles));
+  scene_.triangle_part.reserve(static_cast<std::size_t>(size.triangles));
+  world_.reserve(static_cast<std::size_t>(size.vertices));
 }
 
 // ---------------------------------------------------------------- reading a primitive
@@ -115,14 +133,16 @@ void MeshWriter::check(Json mesh) {
   }
 }
 
-Accessor MeshWriter::attribute(Json attributes, std::string_view name, std::string_view types, unsigned formats, unsigned quantized_formats) {
+Accessor MeshWriter::attribute(Json attributes, std::string_view name, std::string_view types, unsigned formats,
+                               unsigned quantized_formats) {
   const Json reference = attributes[name];
   if (!reference) return {};
   Accessor accessor = model_.accessors[reference.index()];
   const unsigned format = format_bit(accessor.component_type(), accessor.normalized());
   const bool known = types.find(accessor.type()) != std::string_view::npos && (format & (formats | quantized_formats)) != 0;
   if (!known) reference.fail(format_text(accessor) + " is not a format for this");
-  if ((format & formats) == 0 && !model_.quantized) model_.notes.add("integer vertex attributes are used without declaring KHR_mesh_quantization");
+  if ((format & formats) == 0 && !model_.quantized)
+    model_.notes.add("integer vertex attributes are used without declaring KHR_mesh_quantization");
   return accessor;
 }
 
@@ -143,12 +163,14 @@ MeshWriter::Attributes MeshWriter::read_attributes(Json primitive, const Placeme
   a.color = attribute(json, "COLOR_0", "VEC3 VEC4", kF32 | kU8N | kU16N, 0);
   for (const std::size_t set : {0, 1}) {
     a.uv[set] = attribute(json, "TEXCOORD_" + std::to_string(sets.texcoord[set]), "VEC2", kF32 | kU8N | kU16N, kAnySmall);
-    if (!a.uv[set] && sets.used[set]) model_.notes.count("textured mesh has no texture coordinates", "textured meshes have no texture coordinates", 1);
+    if (!a.uv[set] && sets.used[set])
+      model_.notes.count("textured mesh has no texture coordinates", "textured meshes have no texture coordinates", 1);
   }
   if (placement.joints != nullptr) {
     for (int set = 0;; ++set) {
       const std::string number = std::to_string(set);
-      const Accessor joints = attribute(json, "JOINTS_" + number, "VEC4", kU8 | kU16, 0), weights = attribute(json, "WEIGHTS_" + number, "VEC4", kF32 | kU8N | kU16N, 0);
+      const Accessor joints = attribute(json, "JOINTS_" + number, "VEC4", kU8 | kU16, 0),
+                     weights = attribute(json, "WEIGHTS_" + number, "VEC4", kF32 | kU8N | kU16N, 0);
       if (!joints && !weights) break;
       if (!joints || !weights) json.fail("JOINTS_" + number + " and WEIGHTS_" + number + " are not both there");
       a.joints.push_back(joints);
@@ -165,7 +187,9 @@ MeshWriter::Attributes MeshWriter::read_attributes(Json primitive, const Placeme
     const double weight = i < weight_of.size() ? weight_of[i] : 0;
     ++i;
     if (weight == 0) continue;
-    a.targets.push_back({weight, attribute(target, "POSITION", "VEC3", kF32, kAnySmall), attribute(target, "NORMAL", "VEC3", kF32, kI8N | kI16N), attribute(target, "TANGENT", "VEC3", kF32, kI8N | kI16N)});
+    a.targets.push_back({weight, attribute(target, "POSITION", "VEC3", kF32, kAnySmall),
+                         attribute(target, "NORMAL", "VEC3", kF32, kI8N | kI16N),
+                         attribute(target, "TANGENT", "VEC3", kF32, kI8N | kI16N)});
   }
   return a;
 }
@@ -183,15 +207,23 @@ bool MeshWriter::read_corners(Json primitive, std::size_t vertex_count) {
   }
   const std::size_t count = indices ? indices.count() : vertex_count;
   const std::size_t triangles = triangle_count(mode, count);
-  if (mode == kTriangles && count % 3 != 0) model_.notes.count("primitive ends with an incomplete triangle", "primitives end with an incomplete triangle", 1);
+  if (mode == kTriangles && count % 3 != 0)
+    model_.notes.count("primitive ends with an incomplete triangle", "primitives end with an incomplete triangle", 1);
   if (vertex_count > UINT32_MAX || triangles * 3 > UINT32_MAX) primitive.fail("has more than 4,294,967,295 vertices or corners");
 
-  const std::uint32_t restart = !indices ? UINT32_MAX : component_bytes(indices.component_type()) == 1 ? 0xff : component_bytes(indices.component_type()) == 2 ? 0xffff : UINT32_MAX;
+  const std::uint32_t restart = !indices                                         ? UINT32_MAX
+                                : component_bytes(indices.component_type()) == 1 ? 0xff
+                                : component_bytes(indices.component_type()) == 2 ? 0xffff
+                                                                                 : UINT32_MAX;
   const auto vertex = [&](std::size_t i) {
     if (!indices) return static_cast<std::uint32_t>(i);
     const std::uint32_t index = indices.index(i);
-    if (index == restart) indices.json().fail("element " + std::to_string(i) + " is " + std::to_string(index) + ", which stands for primitive restart and is not allowed");
-    if (index >= vertex_count) indices.json().fail("element " + std::to_string(i) + " is " + std::to_string(index) + ", but there are only " + std::to_string(vertex_count) + " vertices");
+    if (index == restart)
+      indices.json().fail("element " + std::to_string(i) + " is " + std::to_string(index) +
+                          ", which stands for primitive restart and is not allowed");
+    if (index >= vertex_count)
+      indices.json().fail("element " + std::to_string(i) + " is " + std::to_string(index) + ", but there are only " +
+                          std::to_string(vertex_count) + " vertices");
     return index;
   };
   corners_.clear();
@@ -199,7 +231,9 @@ bool MeshWriter::read_corners(Json primitive, std::size_t vertex_count) {
   for (std::size_t t = 0; t < triangles; ++t) {
     // As section 3.7.2.1 of the specification lists them: strips alternate, fans turn around the first vertex.
     const std::size_t odd = t % 2;
-    const std::array<std::size_t, 3> at = mode == kTriangles ? std::array{3 * t, 3 * t + 1, 3 * t + 2} : mode == kStrip ? std::array{t, t + 1 + odd, t + 2 - odd} : std::array{t + 1, t + 2, std::size_t{0}};
+    const std::array<std::size_t, 3> at = mode == kTriangles ? std::array{3 * t, 3 * t + 1, 3 * t + 2}
+                                          : mode == kStrip   ? std::array{t, t + 1 + odd, t + 2 - odd}
+                                                             : std::array{t + 1, t + 2, std::size_t{0}};
     for (const std::size_t i : at) corners_.push_back(vertex(i));
   }
   return triangles > 0;
@@ -213,7 +247,8 @@ void MeshWriter::number_vertices(std::size_t vertex_count) {
     vertices_ = corners_;
     std::sort(vertices_.begin(), vertices_.end());
     vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
-    for (std::uint32_t& corner : corners_) corner = static_cast<std::uint32_t>(std::lower_bound(vertices_.begin(), vertices_.end(), corner) - vertices_.begin());
+    for (std::uint32_t& corner : corners_)
+      corner = static_cast<std::uint32_t>(std::lower_bound(vertices_.begin(), vertices_.end(), corner) - vertices_.begin());
     return;
   }
   if (stamps_.size() < vertex_count) {
@@ -235,13 +270,15 @@ void MeshWriter::number_vertices(std::size_t vertex_count) {
 
 void MeshWriter::add_primitive(Json primitive, const Placement& placement) {
   const Json position = primitive["attributes"]["POSITION"];
-  if (!position) return model_.notes.count("primitive without positions is ignored", "primitives without positions are ignored", 1);
+  if (!position)
+    return model_.notes.count("primitive without positions is ignored", "primitives without positions are ignored", 1);
   if (!read_corners(primitive, model_.accessors[position.index()].count())) return;
 
   Part part;
   part.material = materials_.use(primitive["material"]);
   const Attributes attributes = read_attributes(primitive, placement, materials_.uv_sets(part.material));
-  if (!attributes.position.has_data() && primitive["extensions"]["KHR_draco_mesh_compression"]) primitive.fail("the extension KHR_draco_mesh_compression is not supported, and there is no uncompressed data beside it");
+  if (!attributes.position.has_data() && primitive["extensions"]["KHR_draco_mesh_compression"])
+    primitive.fail("the extension KHR_draco_mesh_compression is not supported, and there is no uncompressed data beside it");
   number_vertices(attributes.position.count());
 
   part.has_normals = static_cast<bool>(attributes.normal);
@@ -261,7 +298,8 @@ void MeshWriter::add_primitive(Json primitive, const Placement& placement) {
   }
 }
 
-void MeshWriter::append_part(Part part, const Attributes& attributes, const Affine& world, const std::vector<Affine>* joints, bool is_strip) {
+void MeshWriter::append_part(Part part, const Attributes& attributes, const Affine& world, const std::vector<Affine>* joints,
+                             bool is_strip) {
   const auto first_vertex = static_cast<std::uint32_t>(world_.size());
   part.first_triangle = static_cast<std::uint32_t>(scene_.triangles.size());
   std::vector<bool> mirrored(vertices_.size(), false);
@@ -287,7 +325,8 @@ void MeshWriter::append_part(Part part, const Attributes& attributes, const Affi
 }
 
 /// The joints' mean transform, weighted as the vertex says; the node's own if it says nothing.
-Affine MeshWriter::skin_transform(const Attributes& attributes, const std::vector<Affine>& joints, const Affine& world, std::size_t vertex) const {
+Affine MeshWriter::skin_transform(const Attributes& attributes, const std::vector<Affine>& joints, const Affine& world,
+                                  std::size_t vertex) const {
   Affine sum{glm::dmat3(0.0), DVec3(0.0)};
   double total = 0;
   for (std::size_t set = 0; set < attributes.joints.size(); ++set) {
@@ -296,7 +335,8 @@ Affine MeshWriter::skin_transform(const Attributes& attributes, const std::vecto
       if (weights[k] == 0) continue;
       const auto joint = static_cast<std::size_t>(indices[k]);
       if (joint >= joints.size()) {
-        attributes.joints[set].json().fail("element " + std::to_string(vertex) + " names joint " + std::to_string(joint) + ", but the skin has only " + std::to_string(joints.size()));
+        attributes.joints[set].json().fail("element " + std::to_string(vertex) + " names joint " + std::to_string(joint) +
+                                           ", but the skin has only " + std::to_string(joints.size()));
       }
       sum.linear += joints[joint].linear * weights[k];
       sum.translation += joints[joint].translation * weights[k];
@@ -306,8 +346,8 @@ Affine MeshWriter::skin_transform(const Attributes& attributes, const std::vecto
   return total == 0 ? world : Affine{sum.linear / total, sum.translation / total};
 }
 
-void MeshWriter::append_vertex(const Attributes& attributes, const Part& part, const Affine& transform, const glm::dmat3& normal_transform, std::size_t vertex) {
-  const std::size_t before = world_.size();
+void MeshWriter::append_vertex(const Attributes& attributes, const Part& part, const Affine& transform,
+                               const glm::dmat3& normal_transform, std::size_t vertex) {
   DVec3 position = attributes.position.vec3(vertex), normal(0.0);
   std::array<double, 4> tangent{};
   if (part.has_normals) normal = attributes.normal.vec3(vertex);
@@ -321,7 +361,7 @@ void MeshWriter::append_vertex(const Attributes& attributes, const Part& part, c
   }
   world_.push_back(transform.point(position));
 
-  append(scene_.normals, before, part.has_normals, part.has_normals ? unit_or_zero(normal_transform * normal) : Vec3(0), Vec3(0));
+  append(scene_.normals, world_, part.has_normals, part.has_normals ? unit_or_zero(normal_transform * normal) : Vec3(0), Vec3(0));
   Vec4 world_tangent(0);
   if (part.has_tangents) {
     // Under a mirroring transform the bitangent turns against normal x tangent.
@@ -329,12 +369,12 @@ void MeshWriter::append_vertex(const Attributes& attributes, const Part& part, c
     const Vec3 direction = unit_or_zero(transform.linear * DVec3(tangent[0], tangent[1], tangent[2]));
     world_tangent = Vec4(direction, (tangent[3] < 0 ? -1 : 1) * side);
   }
-  append(scene_.tangents, before, part.has_tangents, world_tangent, Vec4(0));
+  append(scene_.tangents, world_, part.has_tangents, world_tangent, Vec4(0));
 
   for (const std::size_t set : {0, 1}) {
     const Accessor& uv = attributes.uv[set];
     const auto at = uv ? uv.get<2>(vertex) : std::array<double, 2>{};
-    append(scene_.uvs[set], before, static_cast<bool>(uv), Vec2(finite_or(at[0], 0), finite_or(at[1], 0)), Vec2(0));
+    append(scene_.uvs[set], world_, static_cast<bool>(uv), Vec2(finite_or(at[0], 0), finite_or(at[1], 0)), Vec2(0));
   }
   std::array<double, 4> color{1, 1, 1, 1};
   if (part.has_colors) {
@@ -342,7 +382,7 @@ void MeshWriter::append_vertex(const Attributes& attributes, const Part& part, c
     if (attributes.color.components() == 3) color[3] = 1;
   }
   const auto clamped = [&](std::size_t k) { return std::clamp(finite_or(color[k], 1), 0.0f, 1.0f); };
-  append(scene_.colors, before, part.has_colors, Vec4(clamped(0), clamped(1), clamped(2), clamped(3)), Vec4(1));
+  append(scene_.colors, world_, part.has_colors, Vec4(clamped(0), clamped(1), clamped(2), clamped(3)), Vec4(1));
 }
 
 void MeshWriter::append_triangles(const std::vector<bool>& mirrored, std::uint32_t first_vertex, bool is_strip) {
@@ -365,7 +405,9 @@ void MeshWriter::append_triangles(const std::vector<bool>& mirrored, std::uint32
     if (flip) std::swap(triangle.y, triangle.z);
     scene_.triangles.push_back(triangle);
   }
-  if (broken > 0) model_.notes.count("triangle with a position that is not a finite number or beyond 1e30 was dropped", "triangles with positions that are not finite numbers or beyond 1e30 were dropped", broken);
+  if (broken > 0)
+    model_.notes.count("triangle with a position that is not a finite number or beyond 1e30 was dropped",
+                       "triangles with positions that are not finite numbers or beyond 1e30 were dropped", broken);
   if (degenerate > 0) model_.notes.count("triangle without area was dropped", "triangles without area were dropped", degenerate);
 }
 

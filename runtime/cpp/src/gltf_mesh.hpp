@@ -19,7 +19,7 @@ struct Placement {
 
 /// How much a mesh will need, from its accessors' counts alone.
 struct MeshSize {
-  double triangles = 0, bytes = 0;
+  double triangles = 0, vertices = 0, bytes = 0;
 };
 
 /// Writes triangles into the SceneData, but for the positions: those stay in double precision until the box is known.
@@ -33,6 +33,8 @@ class MeshWriter {
   void check(Json mesh);
 
   MaterialReader& materials() { return materials_; }
+  /// Makes room for what is to come.
+  void reserve(const MeshSize& size);
   /// World position of each vertex.
   std::vector<DVec3>& world() { return world_; }
 
@@ -51,12 +53,16 @@ class MeshWriter {
   void add_primitive(Json primitive, const Placement& placement);
   Attributes read_attributes(Json primitive, const Placement& placement, const UvSets& sets);
   void require_count(Json attributes, std::size_t wanted) const;
-  Accessor attribute(Json attributes, std::string_view name, std::string_view types, unsigned formats, unsigned quantized_formats);
+  Accessor attribute(Json attributes, std::string_view name, std::string_view types, unsigned formats,
+                     unsigned quantized_formats);
   bool read_corners(Json primitive, std::size_t vertex_count);
   void number_vertices(std::size_t vertex_count);
-  Affine skin_transform(const Attributes& attributes, const std::vector<Affine>& joints, const Affine& world, std::size_t vertex) const;
-  void append_part(Part part, const Attributes& attributes, const Affine& world, const std::vector<Affine>* joints, bool is_strip);
-  void append_vertex(const Attributes& attributes, const Part& part, const Affine& transform, const glm::dmat3& normal_transform, std::size_t vertex);
+  Affine skin_transform(const Attributes& attributes, const std::vector<Affine>& joints, const Affine& world,
+                        std::size_t vertex) const;
+  void append_part(Part part, const Attributes& attributes, const Affine& world, const std::vector<Affine>* joints,
+                   bool is_strip);
+  void append_vertex(const Attributes& attributes, const Part& part, const Affine& transform, const glm::dmat3& normal_transform,
+                     std::size_t vertex);
   void append_triangles(const std::vector<bool>& mirrored, std::uint32_t first_vertex, bool is_strip);
 
   Model& model_;

@@ -39,16 +39,25 @@ std::vector<std::string> Notes::take() const {
 namespace {
 
 /// Extensions that are read, or say nothing about a picture of the default state at rest.
-constexpr std::array<std::string_view, 15> kRead{
-    "KHR_lights_punctual",     "KHR_materials_emissive_strength", "KHR_materials_ior",      "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_specular",  "KHR_materials_transmission",      "KHR_materials_unlit",    "KHR_materials_volume",
-    "KHR_texture_transform",   "KHR_mesh_quantization",           "KHR_xmp",                "KHR_xmp_json_ld",
-    "EXT_mesh_gpu_instancing", "KHR_animation_pointer",           "KHR_materials_variants"};
+constexpr std::array<std::string_view, 15> kRead{"KHR_lights_punctual",
+                                                 "KHR_materials_emissive_strength",
+                                                 "KHR_materials_ior",
+                                                 "KHR_materials_pbrSpecularGlossiness",
+                                                 "KHR_materials_specular",
+                                                 "KHR_materials_transmission",
+                                                 "KHR_materials_unlit",
+                                                 "KHR_materials_volume",
+                                                 "KHR_texture_transform",
+                                                 "KHR_mesh_quantization",
+                                                 "KHR_xmp",
+                                                 "KHR_xmp_json_ld",
+                                                 "EXT_mesh_gpu_instancing",
+                                                 "KHR_animation_pointer",
+                                                 "KHR_materials_variants"};
 
 constexpr std::string_view kMeshopt = "EXT_meshopt_compression";
 
 bool is_read(std::string_view name) { return std::find(kRead.begin(), kRead.end(), name) != kRead.end(); }
-
 
 [[noreturn]] void refuse_extension(Json at, std::string_view name, std::string_view why) {
   at.fail("the extension " + printable(name, 80) + " " + std::string(why));
@@ -121,16 +130,19 @@ void Model::check_version() const {
     const auto major = std::from_chars(text.data(), text.data() + text.size(), version.major);
     const bool has_point = major.ec == std::errc{} && major.ptr < text.data() + text.size() && *major.ptr == '.';
     const auto minor = has_point ? std::from_chars(major.ptr + 1, text.data() + text.size(), version.minor) : major;
-    if (!has_point || minor.ec != std::errc{} || minor.ptr != text.data() + text.size()) json.fail("\"" + printable(text, 40) + "\" is not a version like \"2.0\"");
+    if (!has_point || minor.ec != std::errc{} || minor.ptr != text.data() + text.size())
+      json.fail("\"" + printable(text, 40) + "\" is not a version like \"2.0\"");
     return version;
   };
   const Json asset = root()["asset"];
   if (!asset.is_object() || asset["version"].text().empty()) root().fail("asset.version is missing: is this a glTF file?");
-  if (read(asset["version"]).major != 2) asset["version"].fail("glTF " + printable(asset["version"].text(), 40) + " is not supported, only 2.0 is");
+  if (read(asset["version"]).major != 2)
+    asset["version"].fail("glTF " + printable(asset["version"].text(), 40) + " is not supported, only 2.0 is");
   const Json least = asset["minVersion"];
   if (!least || least.kind() != JsonKind::string) return;
   const Version wanted = read(least);
-  if (wanted.major > 2 || wanted.minor > 0) least.fail("the file needs a reader of glTF " + printable(least.text(), 40) + "; this one reads 2.0");
+  if (wanted.major > 2 || wanted.minor > 0)
+    least.fail("the file needs a reader of glTF " + printable(least.text(), 40) + "; this one reads 2.0");
 }
 
 void Model::load_buffers(const Glb& glb) {
@@ -140,7 +152,8 @@ void Model::load_buffers(const Glb& glb) {
 
 /// True if a buffer is there for what a decoder of EXT_meshopt_compression would write.
 bool Model::holds_meshopt_data(std::size_t buffer) const {
-  return std::any_of(buffer_views.begin(), buffer_views.end(), [&](Json view) { return view["buffer"].index() == buffer && view["extensions"][kMeshopt]; });
+  return std::any_of(buffer_views.begin(), buffer_views.end(),
+                     [&](Json view) { return view["buffer"].index() == buffer && view["extensions"][kMeshopt]; });
 }
 
 Bytes Model::load_buffer(Json buffer, std::size_t index, const Glb& glb) {
@@ -149,7 +162,8 @@ Bytes Model::load_buffer(Json buffer, std::size_t index, const Glb& glb) {
   Bytes bytes;
   if (!uri) {
     if (index == 0 && glb.has_binary) {
-      bytes = {std::shared_ptr<std::uint8_t[]>(file.data, file.data.get() + (glb.binary.data() - file.data.get())), glb.binary.size()};
+      bytes = {std::shared_ptr<std::uint8_t[]>(file.data, file.data.get() + (glb.binary.data() - file.data.get())),
+               glb.binary.size()};
     } else if (holds_meshopt_data(index)) {
       refuse_extension(buffer, kMeshopt, "is not supported, and there is no uncompressed data beside it");
     } else {
@@ -162,7 +176,8 @@ Bytes Model::load_buffer(Json buffer, std::size_t index, const Glb& glb) {
       uri.fail((is_data_uri(uri.text()) ? "" : "\"" + printable(uri.text(), 120) + "\": ") + error.what());
     }
   }
-  if (bytes.size < wanted) buffer.fail("byteLength", std::to_string(wanted) + " bytes are wanted, there are " + std::to_string(bytes.size));
+  if (bytes.size < wanted)
+    buffer.fail("byteLength", std::to_string(wanted) + " bytes are wanted, there are " + std::to_string(bytes.size));
   bytes.size = wanted;
   return bytes;
 }
@@ -170,12 +185,15 @@ Bytes Model::load_buffer(Json buffer, std::size_t index, const Glb& glb) {
 void Model::check_buffer_views() const {
   for (const Json json : buffer_views) {
     const std::size_t buffer_size = buffers[json["buffer"].index()].size;
-    const auto offset = static_cast<std::uint64_t>(json["byteOffset"].integer(0)), length = static_cast<std::uint64_t>(json["byteLength"].integer(0));
+    const auto offset = static_cast<std::uint64_t>(json["byteOffset"].integer(0)),
+               length = static_cast<std::uint64_t>(json["byteLength"].integer(0));
     if (offset > buffer_size || length > buffer_size - offset) {
-      json.fail(std::to_string(length) + " bytes from byte " + std::to_string(offset) + " on do not fit the buffer with its " + std::to_string(buffer_size) + " bytes");
+      json.fail(std::to_string(length) + " bytes from byte " + std::to_string(offset) + " on do not fit the buffer with its " +
+                std::to_string(buffer_size) + " bytes");
     }
     const Json stride = json["byteStride"];
-    if (stride && static_cast<std::uint64_t>(stride.integer(0)) > length) stride.fail(std::to_string(stride.integer(0)) + " is more than the view's " + std::to_string(length) + " bytes");
+    if (stride && static_cast<std::uint64_t>(stride.integer(0)) > length)
+      stride.fail(std::to_string(stride.integer(0)) + " is more than the view's " + std::to_string(length) + " bytes");
   }
 }
 

@@ -47,7 +47,8 @@ NodeForest::NodeForest(Model& model) : model_(model) {
     for (const Json child : model.nodes[i]["children"]) {
       std::uint32_t& known = parent[child.index()];
       if (known != kNone) {
-        child.fail("nodes[" + std::to_string(child.index()) + "] is a child of nodes[" + std::to_string(known) + "] already; nodes must form trees");
+        child.fail("nodes[" + std::to_string(child.index()) + "] is a child of nodes[" + std::to_string(known) +
+                   "] already; nodes must form trees");
       }
       known = i;
     }
@@ -84,7 +85,8 @@ std::vector<std::uint32_t> NodeForest::scene_roots() const {
   for (const Json node : scene["nodes"]) {
     const std::uint32_t index = node.index();
     if (listed[index]) node.fail("nodes[" + std::to_string(index) + "] is listed twice");
-    if (!is_root[index]) node.fail("nodes[" + std::to_string(index) + "] is the child of another node; a scene lists root nodes only");
+    if (!is_root[index])
+      node.fail("nodes[" + std::to_string(index) + "] is the child of another node; a scene lists root nodes only");
     listed[index] = true;
     roots.push_back(index);
   }
@@ -96,25 +98,32 @@ void NodeForest::check_transform(Json node) const {
   if (matrix) {
     const auto m = numbers<16>(matrix, {});
     constexpr double kSlack = 1e-6;
-    const bool affine = std::abs(m[3]) <= kSlack && std::abs(m[7]) <= kSlack && std::abs(m[11]) <= kSlack && std::abs(m[15] - 1) <= kSlack;
+    const bool affine =
+        std::abs(m[3]) <= kSlack && std::abs(m[7]) <= kSlack && std::abs(m[11]) <= kSlack && std::abs(m[15] - 1) <= kSlack;
     if (!affine) matrix.fail("the last row is not 0 0 0 1");
     const bool has_more = node["translation"] || rotation || node["scale"];
-    if (has_more) model_.notes.count("node has a matrix and also translation, rotation or scale; the matrix is used", "nodes have a matrix and also translation, rotation or scale; the matrix is used", 1);
+    if (has_more)
+      model_.notes.count("node has a matrix and also translation, rotation or scale; the matrix is used",
+                         "nodes have a matrix and also translation, rotation or scale; the matrix is used", 1);
     return;
   }
   if (!rotation) return;
   const auto q = numbers<4>(rotation, {0, 0, 0, 1});
   const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (norm == 0) rotation.fail("the quaternion is zero");
-  if (std::abs(norm - 1) > 1e-2) model_.notes.count("rotation is not a unit quaternion and was normalised", "rotations are not unit quaternions and were normalised", 1);
+  if (std::abs(norm - 1) > 1e-2)
+    model_.notes.count("rotation is not a unit quaternion and was normalised",
+                       "rotations are not unit quaternions and were normalised", 1);
 }
 
 Affine NodeForest::local(Json node) const {
   if (const Json matrix = node["matrix"]) return make_affine(numbers<16>(matrix, {}));
-  return make_trs(vec3(numbers<3>(node["translation"], {})), numbers<4>(node["rotation"], {0, 0, 0, 1}), vec3(numbers<3>(node["scale"], {1, 1, 1})));
+  return make_trs(vec3(numbers<3>(node["translation"], {})), numbers<4>(node["rotation"], {0, 0, 0, 1}),
+                  vec3(numbers<3>(node["scale"], {1, 1, 1})));
 }
 
-void NodeForest::walk(const std::vector<std::uint32_t>& roots, const std::function<void(std::uint32_t, const Affine&)>& visit) const {
+void NodeForest::walk(const std::vector<std::uint32_t>& roots,
+                      const std::function<void(std::uint32_t, const Affine&)>& visit) const {
   struct Level {
     Affine world;
     Json::Iterator next, end;

@@ -47,7 +47,8 @@ std::uint64_t mix(std::uint64_t x) {
 /// that triangles which differ are rarely looked at.
 class DuplicateFinder {
  public:
-  explicit DuplicateFinder(const SceneData& scene) : scene_(scene), slots_(std::bit_ceil(scene.triangles.size() * 3 / 2 + 1), kFree) {
+  explicit DuplicateFinder(const SceneData& scene)
+      : scene_(scene), slots_(std::bit_ceil(scene.triangles.size() * 3 / 2 + 1), kFree) {
     vertex_hashes_.reserve(scene.positions.size());
     for (const Vec3& position : scene.positions) {
       const Corner bits = corner_bits(position);
@@ -87,7 +88,8 @@ class DuplicateFinder {
 
   std::array<Corner, 3> corners(std::uint32_t triangle) const {
     const UVec3& t = scene_.triangles[triangle];
-    std::array<Corner, 3> corners{corner_bits(scene_.positions[t.x]), corner_bits(scene_.positions[t.y]), corner_bits(scene_.positions[t.z])};
+    std::array<Corner, 3> corners{corner_bits(scene_.positions[t.x]), corner_bits(scene_.positions[t.y]),
+                                  corner_bits(scene_.positions[t.z])};
     std::sort(corners.begin(), corners.end());
     return corners;
   }
@@ -183,7 +185,9 @@ std::vector<bool> find_doomed(const SceneData& scene, Notes& notes) {
     }
   }
   if (degenerate > 0) notes.count("triangle without area was dropped", "triangles without area were dropped", degenerate);
-  if (duplicate > 0) notes.count("triangle with the same corners as another one was dropped", "triangles with the same corners as another one were dropped", duplicate);
+  if (duplicate > 0)
+    notes.count("triangle with the same corners as another one was dropped",
+                "triangles with the same corners as another one were dropped", duplicate);
   return doomed;
 }
 

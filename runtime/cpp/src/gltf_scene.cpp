@@ -23,7 +23,8 @@ struct Placed {
 
 class SceneReader {
  public:
-  SceneReader(const std::string& path, const LoadLimits& limits) : model_(path, limits.max_bytes), forest_(model_), roots_(forest_.scene_roots()), meshes_(model_, scene_) {}
+  SceneReader(const std::string& path, const LoadLimits& limits)
+      : model_(path, limits.max_bytes), forest_(model_), roots_(forest_.scene_roots()), meshes_(model_, scene_) {}
 
   SceneData read();
 
@@ -43,7 +44,7 @@ class SceneReader {
   std::vector<std::uint32_t> roots_;
   SceneData scene_;
   MeshWriter meshes_;
-  std::map<std::uint32_t, Affine> joint_worlds_;  // of nodes that are joints of some skin
+  std::map<std::uint32_t, Affine> joint_worlds_;       // of nodes that are joints of some skin
   std::map<std::size_t, std::vector<Affine>> joints_;  // by skin
   std::vector<bool> used_meshes_;
   std::vector<Placed> cameras_, lights_;
@@ -65,14 +66,16 @@ void SceneReader::measure() {
     const MeshSize& size = sizes[mesh.index()];
     if (size.triangles == 0) return;
     double copies = 1;
-    for (const Json attribute : node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]) copies = static_cast<double>(model_.accessors[attribute.index()].count());
+    for (const Json attribute : node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"])
+      copies = static_cast<double>(model_.accessors[attribute.index()].count());
     total.triangles += copies * size.triangles;
+    total.vertices += copies * size.vertices;
     const double parts = copies * static_cast<double>(model_.meshes[mesh.index()]["primitives"].size());
-    total.bytes += copies * (size.bytes + sizeof(Affine)) + parts * (name_and_tags_bytes(node) + name_and_tags_bytes(model_.meshes[mesh.index()]));
+    total.bytes += copies * (size.bytes + sizeof(Affine)) +
+                   parts * (name_and_tags_bytes(node) + name_and_tags_bytes(model_.meshes[mesh.index()]));
   });
   model_.memory.claim(total.bytes, model_.document->file() + ": the scene, with " + number_text(total.triangles) + " triangles,");
-  scene_.triangles.reserve(static_cast<std::size_t>(total.triangles));
-  scene_.triangle_part.reserve(static_cast<std::size_t>(total.triangles));
+  meshes_.reserve(total);
 }
 
 /// Finds where the joints of all skins are at rest.
@@ -95,8 +98,11 @@ const std::vector<Affine>& SceneReader::joints_of(std::size_t skin_index) {
   Accessor matrices;
   if (inverse) {
     matrices = model_.accessors[inverse.index()];
-    if (matrices.type() != "MAT4" || matrices.component_type() != ComponentType::f32) inverse.fail("must be an accessor of MAT4 of FLOAT");
-    if (matrices.count() < skin["joints"].size()) inverse.fail("has " + std::to_string(matrices.count()) + " matrices for " + std::to_string(skin["joints"].size()) + " joints");
+    if (matrices.type() != "MAT4" || matrices.component_type() != ComponentType::f32)
+      inverse.fail("must be an accessor of MAT4 of FLOAT");
+    if (matrices.count() < skin["joints"].size())
+      inverse.fail("has " + std::to_string(matrices.count()) + " matrices for " + std::to_string(skin["joints"].size()) +
+                   " joints");
   }
   for (const Json joint : skin["joints"]) {
     const Affine& world = joint_worlds_.at(static_cast<std::uint32_t>(joint.index()));
@@ -112,14 +118,16 @@ std::vector<Affine> SceneReader::instances(Json node, const Affine& world) const
     const Json reference = attributes[name];
     if (!reference) return Accessor();
     Accessor accessor = model_.accessors[reference.index()];
-    if (accessor.type() != type) reference.fail("is an accessor of " + std::string(accessor.type()) + " where " + std::string(type) + " is wanted");
+    if (accessor.type() != type)
+      reference.fail("is an accessor of " + std::string(accessor.type()) + " where " + std::string(type) + " is wanted");
     return accessor;
   };
   const Accessor translation = read("TRANSLATION", "VEC3"), rotation = read("ROTATION", "VEC4"), scale = read("SCALE", "VEC3");
   std::size_t count = 0;
   for (const Json reference : attributes) {
     const std::size_t n = model_.accessors[reference.index()].count();
-    if (count != 0 && n != count) reference.fail("has " + std::to_string(n) + " elements, another attribute has " + std::to_string(count));
+    if (count != 0 && n != count)
+      reference.fail("has " + std::to_string(n) + " elements, another attribute has " + std::to_string(count));
     count = n;
   }
   std::vector<Affine> transforms;
@@ -169,7 +177,8 @@ void SceneReader::add_camera(const Placed& placed) {
   const DVec3 up = direction(direction(y) - forward * glm::dot(forward, direction(y)));
   const DVec3 right = direction(glm::cross(forward, up));
   if (!is_finite_position(camera.position) || right == DVec3(0)) {
-    return model_.notes.count("camera is ignored: its transform is singular or not finite", "cameras are ignored: their transforms are singular or not finite", 1);
+    return model_.notes.count("camera is ignored: its transform is singular or not finite",
+                              "cameras are ignored: their transforms are singular or not finite", 1);
   }
   camera.forward = Vec3(forward);
   camera.up = Vec3(up);
@@ -181,7 +190,8 @@ void SceneReader::add_camera(const Placed& placed) {
   if (camera.orthographic) {
     camera.ymag = static_cast<float>(lens["ymag"].number(1) / scene_.unit);
     camera.aspect = static_cast<float>(lens["xmag"].number(1) / lens["ymag"].number(1));
-    if (!(camera.ymag > 0 && std::isfinite(camera.ymag))) lens.fail("ymag", number_text(lens["ymag"].number(1)) + " is out of proportion to the scene");
+    if (!(camera.ymag > 0 && std::isfinite(camera.ymag)))
+      lens.fail("ymag", number_text(lens["ymag"].number(1)) + " is out of proportion to the scene");
   } else {
     camera.yfov = static_cast<float>(lens["yfov"].number(0.8));
     camera.aspect = static_cast<float>(lens["aspectRatio"].number(0));
@@ -195,8 +205,10 @@ Vec3 SceneReader::scaled_intensity(Json light, double factor) const {
   std::array<double, 3> color{1, 1, 1};
   std::size_t i = 0;
   for (const Json component : light["color"]) color[i++] = std::clamp(component.number(1), 0.0, 1.0);
-  for (int k = 0; k < 3; ++k) intensity[static_cast<std::size_t>(k)] = static_cast<float>(color[static_cast<std::size_t>(k)] * strength * factor);
-  if (!is_finite_position(intensity)) light.fail("intensity", number_text(strength) + " is out of proportion to the scene's size of " + number_text(scene_.unit));
+  for (int k = 0; k < 3; ++k)
+    intensity[static_cast<std::size_t>(k)] = static_cast<float>(color[static_cast<std::size_t>(k)] * strength * factor);
+  if (!is_finite_position(intensity))
+    light.fail("intensity", number_text(strength) + " is out of proportion to the scene's size of " + number_text(scene_.unit));
   return intensity;
 }
 
@@ -214,15 +226,18 @@ void SceneReader::add_light(const Placed& placed) {
   const DVec3 shines = direction(-placed.world.linear[2]);
   const bool needs_direction = light.kind != PunctualKind::point, needs_position = light.kind != PunctualKind::directional;
   if ((needs_direction && shines == DVec3(0)) || (needs_position && !is_finite_position(light.position))) {
-    return model_.notes.count("light is ignored: its transform is singular or not finite", "lights are ignored: their transforms are singular or not finite", 1);
+    return model_.notes.count("light is ignored: its transform is singular or not finite",
+                              "lights are ignored: their transforms are singular or not finite", 1);
   }
   if (!needs_position) light.position = Vec3(0);
   if (needs_direction) light.direction = Vec3(shines);
   light.intensity = scaled_intensity(json, needs_position ? 1 / scene_.unit / scene_.unit : 1);
   if (light.kind == PunctualKind::spot) {
     const Json spot = json["spot"];
-    const double inner = spot["innerConeAngle"].number(0), outer = std::min(spot["outerConeAngle"].number(kQuarterPi), 2 * kQuarterPi);
-    if (!(inner < outer)) spot.fail("innerConeAngle", number_text(inner) + " is not less than outerConeAngle, " + number_text(outer));
+    const double inner = spot["innerConeAngle"].number(0),
+                 outer = std::min(spot["outerConeAngle"].number(kQuarterPi), 2 * kQuarterPi);
+    if (!(inner < outer))
+      spot.fail("innerConeAngle", number_text(inner) + " is not less than outerConeAngle, " + number_text(outer));
     light.cos_inner = static_cast<float>(std::cos(inner));
     light.cos_outer = std::max(static_cast<float>(std::cos(outer)), 0.0f);
   }
@@ -243,7 +258,8 @@ SceneData SceneReader::read() {
   if (scene_.materials.empty()) meshes_.materials().use({});
   for (Material& material : scene_.materials) {
     const double distance = static_cast<double>(material.attenuation_distance) / scene_.unit;
-    material.attenuation_distance = static_cast<float>(std::clamp(distance, static_cast<double>(std::numeric_limits<float>::min()), std::numeric_limits<double>::infinity()));
+    material.attenuation_distance = static_cast<float>(
+        std::clamp(distance, static_cast<double>(std::numeric_limits<float>::min()), std::numeric_limits<double>::infinity()));
   }
   const auto by_node = [](const Placed& a, const Placed& b) { return a.node < b.node; };
   std::sort(cameras_.begin(), cameras_.end(), by_node);

@@ -1,4 +1,4 @@
-# The image plug-in's shared object as bytes: from ln_image_plugin_begin up to ln_image_plugin_end.
+// The image plug-in as bytes: from ln_image_plugin_begin up to ln_image_plugin_end.
   .section .rodata
   .balign 16
   .global ln_image_plugin_begin

@@ -13,7 +13,8 @@ using LnImageAllocate = void* (*)(void* context, int width, int height, int chan
 
 /// Decodes an image into the memory that `allocate` gives. `format` is OpenImageIO's name of it: png, jpeg, hdr, openexr.
 /// Returns 0, or 1 after writing a message.
-using LnImageRead = int (*)(const void* bytes, std::size_t size, const char* format, LnImageAllocate allocate, void* context, char* message, std::size_t message_size);
+using LnImageRead = int (*)(const void* bytes, std::size_t size, const char* format, LnImageAllocate allocate, void* context,
+                            char* message, std::size_t message_size);
 }
 
 inline constexpr const char* kImageReadSymbol = "ln_image_read";

@@ -42,7 +42,8 @@ bool write_all(int descriptor, const unsigned char* bytes, std::size_t size) {
 /// Writes the plug-in into `descriptor` and opens it from there under the name `path`.
 void* open_plugin_from(int descriptor, const std::string& path) {
   if (descriptor < 0) return nullptr;
-  const bool written = write_all(descriptor, ln_image_plugin_begin, static_cast<std::size_t>(ln_image_plugin_end - ln_image_plugin_begin));
+  const bool written =
+      write_all(descriptor, ln_image_plugin_begin, static_cast<std::size_t>(ln_image_plugin_end - ln_image_plugin_begin));
   void* library = written ? dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL) : nullptr;
   close(descriptor);
   return library;
@@ -60,7 +61,8 @@ LnImageRead open_plugin() {
     const int file = mkstemp(path.data());
     library = open_plugin_from(file, path);
     if (file >= 0) unlink(path.c_str());
-    if (library == nullptr) throw Error("the image reader cannot be opened (is OpenImageIO installed?): " + printable(first_cause));
+    if (library == nullptr)
+      throw Error("the image reader cannot be opened (is OpenImageIO installed?): " + printable(first_cause));
   }
   const auto read = reinterpret_cast<LnImageRead>(dlsym(library, kImageReadSymbol));
   if (read == nullptr) throw Error("the image reader is not complete");
@@ -145,7 +147,7 @@ Image read_image_file(const std::string& path) {
   gltf::MemoryBudget memory(0);
   const gltf::Bytes file = gltf::read_file(path, memory);
   try {
-    return decode_image(file.span(), false, [&](double size) { memory.claim(size, "the decoded image"); });
+    return decode_image(file.span(), true, [&](double size) { memory.claim(size, "the decoded image"); });
   } catch (const Error& error) {
     throw Error(printable(path) + ": " + error.what());
   }

@@ -54,10 +54,12 @@ class GltfFile {
  public:
   /// Adds an accessor; returns its index. `more` is put into the accessor as it is, such as "\"normalized\":true".
   template <class T>
-  int accessor(int component_type, const std::string& type, std::size_t count, const std::vector<T>& values, const std::string& more = {}) {
+  int accessor(int component_type, const std::string& type, std::size_t count, const std::vector<T>& values,
+               const std::string& more = {}) {
     const int view = buffer_view(values);
-    return accessor_text("{\"bufferView\":" + std::to_string(view) + ",\"componentType\":" + std::to_string(component_type) + ",\"count\":" + std::to_string(count) + ",\"type\":\"" + type + "\"" +
-                         (more.empty() ? "" : "," + more) + "}");
+    return accessor_text("{\"bufferView\":" + std::to_string(view) + ",\"componentType\":" + std::to_string(component_type) +
+                         ",\"count\":" + std::to_string(count) + ",\"type\":\"" + type + "\"" + (more.empty() ? "" : "," + more) +
+                         "}");
   }
   int floats(const std::string& type, const std::vector<float>& values) {
     const std::size_t size = type == "SCALAR" ? 1 : type == "VEC2" ? 2 : type == "VEC3" ? 3 : type == "VEC4" ? 4 : 16;
@@ -69,7 +71,8 @@ class GltfFile {
   template <class T>
   int buffer_view(const std::vector<T>& values) {
     while (bytes_.size() % 4 != 0) bytes_ += '\0';
-    const std::string text = "{\"buffer\":0,\"byteOffset\":" + std::to_string(bytes_.size()) + ",\"byteLength\":" + std::to_string(values.size() * sizeof(T)) + "}";
+    const std::string text = "{\"buffer\":0,\"byteOffset\":" + std::to_string(bytes_.size()) +
+                             ",\"byteLength\":" + std::to_string(values.size() * sizeof(T)) + "}";
     const std::size_t before = bytes_.size();
     bytes_.resize(before + values.size() * sizeof(T));
     if (!values.empty()) std::memcpy(bytes_.data() + before, values.data(), values.size() * sizeof(T));
@@ -81,7 +84,8 @@ class GltfFile {
     std::string out = R"({"asset":{"version":"2.0"},)" + rest;
     if (!accessors_.empty()) out += ",\"accessors\":[" + accessors_ + "]";
     if (!bytes_.empty()) {
-      out += ",\"bufferViews\":[" + views_ + "],\"buffers\":[{\"byteLength\":" + std::to_string(bytes_.size()) + ",\"uri\":\"data:application/octet-stream;base64," + base64(bytes_) + "\"}]";
+      out += ",\"bufferViews\":[" + views_ + "],\"buffers\":[{\"byteLength\":" + std::to_string(bytes_.size()) +
+             ",\"uri\":\"data:application/octet-stream;base64," + base64(bytes_) + "\"}]";
     }
     return out + "}";
   }

@@ -41,8 +41,8 @@ TEST_CASE("text for messages holds no control characters") {
   CHECK(printable("Wände ❤") == "Wände ❤");
   CHECK(printable("a\nb\tc\\") == "a\\nb\\tc\\\\");
   CHECK(printable(std::string("\x1b[31m\0\x7f", 7)) == "\\x1b[31m\\x00\\x7f");
-  CHECK(printable("\xc2\x9b") == "\\xc2\\x9b");   // a C1 control
-  CHECK(printable("\xff\xe2\x9d") == "\\xff\\xe2\\x9d");  // not UTF-8
+  CHECK(printable("\xc2\x9b") == "\\xc2\\x9b");                                                        // a C1 control
+  CHECK(printable("\xff\xe2\x9d") == "\\xff\\xe2\\x9d");                                               // not UTF-8
   CHECK(printable("\xed\xa0\x80\xc0\xaf\xe0\x80\xaf") == "\\xed\\xa0\\x80\\xc0\\xaf\\xe0\\x80\\xaf");  // surrogate, overlong
   CHECK(printable("abcdef", 3) == "abc...");
 }
@@ -78,7 +78,8 @@ TEST_CASE("values are found by name and place") {
 
 TEST_CASE("long strings and many strings stay where they are") {
   std::string text = "[";
-  for (int i = 0; i < 3000; ++i) text += "\"" + std::string(static_cast<std::size_t>(i * 7 % 9000), static_cast<char>('a' + i % 26)) + "\",";
+  for (int i = 0; i < 3000; ++i)
+    text += "\"" + std::string(static_cast<std::size_t>(i * 7 % 9000), static_cast<char>('a' + i % 26)) + "\",";
   const JsonDocument document("f", text + "1]");
   int i = 0;
   for (const Json value : document.root()) {
@@ -122,18 +123,26 @@ TEST_CASE("members are checked by the schema") {
   CHECK(error("\"nodes\":[{\"children\":[0.5]}]") == "f: nodes[0].children[0]: 0.5 is not an integer");
   CHECK(error("\"nodes\":[{\"scale\":[1,2]}]") == "f: nodes[0].scale: 2 numbers where 3 are wanted");
   CHECK(error("\"nodes\":[{\"name\":7}]") == "f: nodes[0].name: a number where a string is wanted");
-  CHECK(error("\"materials\":[{\"pbrMetallicRoughness\":{\"roughnessFactor\":2}}]") == "f: materials[0].pbrMetallicRoughness.roughnessFactor: 2 is not within [0, 1]");
+  CHECK(error("\"materials\":[{\"pbrMetallicRoughness\":{\"roughnessFactor\":2}}]") ==
+        "f: materials[0].pbrMetallicRoughness.roughnessFactor: 2 is not within [0, 1]");
   CHECK(error("\"materials\":[{\"pbrMetallicRoughness\":{\"roughnessFactor\":1.000001}}]") == "");
-  CHECK(error("\"materials\":[{\"alphaMode\":\"\\u001b\"}]") == "f: materials[0].alphaMode: \"\\x1b\" is none of OPAQUE MASK BLEND");
+  CHECK(error("\"materials\":[{\"alphaMode\":\"\\u001b\"}]") ==
+        "f: materials[0].alphaMode: \"\\x1b\" is none of OPAQUE MASK BLEND");
   CHECK(error("\"materials\":[{\"alphaMode\":\"OPAQUE MASK\"}]") != "");
-  CHECK(error("\"cameras\":[{\"type\":\"perspective\",\"perspective\":{\"yfov\":0,\"znear\":1}}]") == "f: cameras[0].perspective.yfov: 0 is not within (0, 3.141592653589793)");
-  CHECK(error("\"cameras\":[{\"type\":\"perspective\",\"perspective\":{\"yfov\":1}}]") == "f: cameras[0].perspective.znear: is missing");
-  CHECK(error("\"accessors\":[{\"componentType\":5130,\"count\":1,\"type\":\"VEC3\"}]").find("5130 is none of") != std::string::npos);
-  CHECK(error("\"accessors\":[{\"componentType\":5126,\"count\":0,\"type\":\"VEC3\"}]").find("accessors[0].count: 0 is not within [1,") != std::string::npos);
+  CHECK(error("\"cameras\":[{\"type\":\"perspective\",\"perspective\":{\"yfov\":0,\"znear\":1}}]") ==
+        "f: cameras[0].perspective.yfov: 0 is not within (0, 3.141592653589793)");
+  CHECK(error("\"cameras\":[{\"type\":\"perspective\",\"perspective\":{\"yfov\":1}}]") ==
+        "f: cameras[0].perspective.znear: is missing");
+  CHECK(error("\"accessors\":[{\"componentType\":5130,\"count\":1,\"type\":\"VEC3\"}]").find("5130 is none of") !=
+        std::string::npos);
+  CHECK(error("\"accessors\":[{\"componentType\":5126,\"count\":0,\"type\":\"VEC3\"}]")
+            .find("accessors[0].count: 0 is not within [1,") != std::string::npos);
   CHECK(error("\"accessors\":[{\"componentType\":5126,\"count\":1e300,\"type\":\"VEC3\"}]") != "");
   CHECK(error("\"meshes\":[{}]") == "f: meshes[0].primitives: is missing");
-  CHECK(error("\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}]") == "f: meshes[0].primitives[0].attributes.POSITION: there is no accessors[0]");
-  CHECK(error("\"extensions\":{\"KHR_lights_punctual\":{\"lights\":[{\"type\":\"point\",\"intensity\":-1}]}}") == "f: extensions.KHR_lights_punctual.lights[0].intensity: -1 is not 0 or more");
+  CHECK(error("\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}]") ==
+        "f: meshes[0].primitives[0].attributes.POSITION: there is no accessors[0]");
+  CHECK(error("\"extensions\":{\"KHR_lights_punctual\":{\"lights\":[{\"type\":\"point\",\"intensity\":-1}]}}") ==
+        "f: extensions.KHR_lights_punctual.lights[0].intensity: -1 is not 0 or more");
   CHECK(schema_error("{}") == "f: asset: is missing");
 }
 
@@ -155,7 +164,8 @@ TEST_CASE("data URIs") {
 TEST_CASE("memory is refused before it is allocated") {
   MemoryBudget memory(1000);
   memory.claim(600, "one");
-  CHECK_THROWS_WITH_AS(memory.claim(600, "two"), "two needs 600 bytes of memory (600 bytes are in use), more than the limit of 1000 bytes", Error);
+  CHECK_THROWS_WITH_AS(memory.claim(600, "two"),
+                       "two needs 600 bytes of memory (600 bytes are in use), more than the limit of 1000 bytes", Error);
   memory.claim(400, "three");
   CHECK_THROWS_AS(memory.claim(1, "four"), Error);
 }

@@ -22,7 +22,8 @@ using namespace ln::test;
 // ---------------------------------------------------------------- a PNG writer
 
 std::string big_endian(std::uint32_t value) {
-  return {static_cast<char>(value >> 24), static_cast<char>(value >> 16), static_cast<char>(value >> 8), static_cast<char>(value)};
+  return {static_cast<char>(value >> 24), static_cast<char>(value >> 16), static_cast<char>(value >> 8),
+          static_cast<char>(value)};
 }
 
 std::uint32_t crc32(const std::string& bytes) {
@@ -34,10 +35,13 @@ std::uint32_t crc32(const std::string& bytes) {
   return ~crc;
 }
 
-std::string chunk(const std::string& type, const std::string& data) { return big_endian(static_cast<std::uint32_t>(data.size())) + type + data + big_endian(crc32(type + data)); }
+std::string chunk(const std::string& type, const std::string& data) {
+  return big_endian(static_cast<std::uint32_t>(data.size())) + type + data + big_endian(crc32(type + data));
+}
 
 /// `rows`: the samples of all rows, one after another, without filter bytes.
-std::string png(std::uint32_t width, std::uint32_t height, char depth, char color_type, const std::string& rows, const std::string& more_chunks = {}) {
+std::string png(std::uint32_t width, std::uint32_t height, char depth, char color_type, const std::string& rows,
+                const std::string& more_chunks = {}) {
   std::string raw;
   const std::size_t row = height == 0 ? 0 : rows.size() / height;
   for (std::uint32_t y = 0; y < height; ++y) raw += '\0' + rows.substr(y * row, row);
@@ -47,11 +51,15 @@ std::string png(std::uint32_t width, std::uint32_t height, char depth, char colo
     b = (b + a) % 65521;
   }
   const auto low = static_cast<char>(raw.size()), high = static_cast<char>(raw.size() >> 8);
-  const std::string stored = std::string("\x78\x01\x01") + low + high + static_cast<char>(~low) + static_cast<char>(~high) + raw + big_endian(b << 16 | a);
-  return "\x89PNG\r\n\x1a\n" + chunk("IHDR", big_endian(width) + big_endian(height) + depth + color_type + std::string(3, '\0')) + more_chunks + chunk("IDAT", stored) + chunk("IEND", "");
+  const std::string stored = std::string("\x78\x01\x01") + low + high + static_cast<char>(~low) + static_cast<char>(~high) + raw +
+                             big_endian(b << 16 | a);
+  return "\x89PNG\r\n\x1a\n" + chunk("IHDR", big_endian(width) + big_endian(height) + depth + color_type + std::string(3, '\0')) +
+         more_chunks + chunk("IDAT", stored) + chunk("IEND", "");
 }
 
-std::span<const std::uint8_t> bytes_of(const std::string& text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
+std::span<const std::uint8_t> bytes_of(const std::string& text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
 
 Image decode(const std::string& file, bool srgb = false) { return decode_image(bytes_of(file), srgb); }
 
@@ -76,7 +84,8 @@ TEST_CASE("8-bit PNG: grey, grey with alpha, RGB, RGBA stay as they are") {
 
 TEST_CASE("PNG with a palette, with and without transparency, and with one bit a pixel") {
   const std::string palette = chunk("PLTE", "\x10\x20\x30\x40\x50\x60");
-  CHECK(decode(png(2, 1, 8, 3, std::string("\x01\x00", 2), palette)).bytes == std::vector<std::uint8_t>{0x40, 0x50, 0x60, 0x10, 0x20, 0x30});
+  CHECK(decode(png(2, 1, 8, 3, std::string("\x01\x00", 2), palette)).bytes ==
+        std::vector<std::uint8_t>{0x40, 0x50, 0x60, 0x10, 0x20, 0x30});
   const Image transparent = decode(png(2, 1, 8, 3, std::string("\x01\x00", 2), palette + chunk("tRNS", "\x80")));
   CHECK(transparent.channels == 4);
   check_texel(transparent, 0, 0, Vec4(0x40, 0x50, 0x60, 255) / 255.0f);
@@ -96,7 +105,8 @@ TEST_CASE("16-bit PNG becomes float, linear where it is sRGB-encoded, but for al
 }
 
 TEST_CASE("Radiance HDR") {
-  const std::string file = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n" + std::string("\x80\x40\x20\x82\x80\x80\x80\x80", 8);
+  const std::string file =
+      "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n" + std::string("\x80\x40\x20\x82\x80\x80\x80\x80", 8);
   const Image image = decode(file);
   CHECK((image.width == 2 && image.height == 1 && image.channels == 3 && image.bytes.empty()));
   CHECK(texel(image, 0, 0).x == doctest::Approx(2.0).epsilon(0.01));
@@ -107,7 +117,8 @@ TEST_CASE("Radiance HDR") {
 TEST_CASE("OpenEXR, from a file; what is no number becomes 0") {
   const TemporaryFolder folder;
   const std::string path = (folder.path() / "environment.exr").string();
-  std::array<float, 6> red{1, 2, 3, 4, 5, std::numeric_limits<float>::quiet_NaN()}, green{0, 0, 0, 0, 0, 0}, blue{1e20f, 0, 0, 0, 0, std::numeric_limits<float>::infinity()};
+  std::array<float, 6> red{1, 2, 3, 4, 5, std::numeric_limits<float>::quiet_NaN()}, green{0, 0, 0, 0, 0, 0},
+      blue{1e20f, 0, 0, 0, 0, std::numeric_limits<float>::infinity()};
   Imf::Header header(3, 2);
   Imf::FrameBuffer frame;
   const auto add = [&](const char* name, std::array<float, 6>& values) {
@@ -165,7 +176,8 @@ TEST_CASE("images of a model: files, data URIs and buffer views, each encoding d
   GltfFile file;
   file.floats("VEC3", {0, 0, 0, 1, 0, 0, 0, 1, 0});
   const int view = file.buffer_view(std::vector<std::uint8_t>(image.begin(), image.end()));
-  const std::string rest = R"("images":[{"uri":"a%20b.png"},{"uri":"data:image/png;base64,)" + base64(image) + "\"},{\"bufferView\":" + std::to_string(view) + R"(,"mimeType":"image/png"},{"uri":"./a b.png"}],
+  const std::string rest = R"("images":[{"uri":"a%20b.png"},{"uri":"data:image/png;base64,)" + base64(image) +
+                           "\"},{\"bufferView\":" + std::to_string(view) + R"(,"mimeType":"image/png"},{"uri":"./a b.png"}],
     "samplers":[{"wrapS":33071,"wrapT":33648,"magFilter":9728}],"textures":[{"source":0,"sampler":0},{"source":1},{"source":2},{"source":3},{"extensions":{"EXT_texture_webp":{"source":0}}}],
     "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0,"texCoord":2},"metallicRoughnessTexture":{"index":3}},"emissiveTexture":{"index":3,"texCoord":2},
       "normalTexture":{"index":1,"scale":0.5,"extensions":{"KHR_texture_transform":{"offset":[0.25,0.5],"rotation":1.5707963267948966,"scale":[2,3],"texCoord":0}}},
@@ -178,10 +190,13 @@ TEST_CASE("images of a model: files, data URIs and buffer views, each encoding d
   for (const Image& i : scene.images) CHECK(i.bytes == std::vector<std::uint8_t>{10, 20, 30});
   CHECK(m.base_color_texture.image == m.emissive_texture.image);
   CHECK(m.base_color_texture.image != m.metallic_roughness_texture.image);
-  CHECK((scene.images[static_cast<std::size_t>(m.base_color_texture.image)].srgb && !scene.images[static_cast<std::size_t>(m.metallic_roughness_texture.image)].srgb));
-  CHECK((m.base_color_texture.wrap_s == Wrap::clamp && m.base_color_texture.wrap_t == Wrap::mirror && m.base_color_texture.nearest));
+  CHECK((scene.images[static_cast<std::size_t>(m.base_color_texture.image)].srgb &&
+         !scene.images[static_cast<std::size_t>(m.metallic_roughness_texture.image)].srgb));
+  CHECK((m.base_color_texture.wrap_s == Wrap::clamp && m.base_color_texture.wrap_t == Wrap::mirror &&
+         m.base_color_texture.nearest));
   CHECK((m.normal_texture.wrap_s == Wrap::repeat && !m.normal_texture.nearest && m.normal_scale == 0.5f));
-  CHECK((m.base_color_texture.uv_set == 1 && m.metallic_roughness_texture.uv_set == 0 && m.normal_texture.uv_set == 0 && m.emissive_texture.uv_set == 1));
+  CHECK((m.base_color_texture.uv_set == 1 && m.metallic_roughness_texture.uv_set == 0 && m.normal_texture.uv_set == 0 &&
+         m.emissive_texture.uv_set == 1));
   // Scale, then a quarter turn that takes u to -v, then the offset.
   const Vec2 moved = transform_uv(m.normal_texture, {0.1f, 0.2f});
   CHECK(moved.x == doctest::Approx(0.25 + 0.6));
@@ -196,7 +211,9 @@ TEST_CASE("missing and broken images are errors that name image and file") {
   GltfFile file;
   file.floats("VEC3", {0, 0, 0, 1, 0, 0, 0, 1, 0});
   for (const char* name : {"missing.png", "broken.png", "../up.png"}) {
-    const std::string rest = R"("images":[{"uri":")" + std::string(name) + R"("}],"textures":[{"source":0}],"materials":[{"emissiveTexture":{"index":0}}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],"nodes":[{"mesh":0}])";
+    const std::string rest =
+        R"("images":[{"uri":")" + std::string(name) +
+        R"("}],"textures":[{"source":0}],"materials":[{"emissiveTexture":{"index":0}}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],"nodes":[{"mesh":0}])";
     try {
       load_gltf(folder.write("scene.gltf", file.text(rest)));
       CHECK(false);

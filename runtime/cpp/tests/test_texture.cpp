@@ -48,11 +48,13 @@ int reference_wrap(long long i, int size, Wrap wrap) {
 double reference_lookup(const Image& image, const TextureRef& ref, double u, double v, int c) {
   const double x = u * image.width, y = v * image.height;
   const auto at = [&](double i, double j) {
-    return reference_channel(image, reference_wrap(static_cast<long long>(i), image.width, ref.wrap_s), reference_wrap(static_cast<long long>(j), image.height, ref.wrap_t), c);
+    return reference_channel(image, reference_wrap(static_cast<long long>(i), image.width, ref.wrap_s),
+                             reference_wrap(static_cast<long long>(j), image.height, ref.wrap_t), c);
   };
   if (ref.nearest) return at(std::floor(x), std::floor(y));
   const double left = std::floor(x - 0.5), top = std::floor(y - 0.5), s = x - 0.5 - left, t = y - 0.5 - top;
-  return (at(left, top) * (1 - s) + at(left + 1, top) * s) * (1 - t) + (at(left, top + 1) * (1 - s) + at(left + 1, top + 1) * s) * t;
+  return (at(left, top) * (1 - s) + at(left + 1, top) * s) * (1 - t) +
+         (at(left, top + 1) * (1 - s) + at(left + 1, top + 1) * s) * t;
 }
 
 }  // namespace
@@ -77,7 +79,8 @@ TEST_CASE("lookups agree with the definition, for all wrap modes, filters and fo
             if (nearest && (to_border < 1e-4 || std::abs(std::remainder(static_cast<double>(uv.y) * 3, 1.0)) < 1e-4)) continue;
             const Vec4 value = lookup(image, ref, uv);
             for (int c = 0; c < 4; ++c) {
-              CHECK(static_cast<double>(value[static_cast<std::size_t>(c)]) == doctest::Approx(reference_lookup(image, ref, uv.x, uv.y, c)).epsilon(1e-4));
+              CHECK(static_cast<double>(value[static_cast<std::size_t>(c)]) ==
+                    doctest::Approx(reference_lookup(image, ref, uv.x, uv.y, c)).epsilon(1e-4));
             }
           }
         }

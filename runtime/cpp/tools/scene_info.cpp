@@ -38,30 +38,39 @@ std::string list_json(const List& list, Item item) {
 }
 
 std::string material_json(const ln::Material& m) {
-  return "{\"name\": " + quoted(m.name) + ", \"base_color\": " + vector_json(m.base_color) + ", \"alpha\": " + number_text(m.alpha) + ", \"metallic\": " + number_text(m.metallic) +
-         ", \"roughness\": " + number_text(m.roughness) + ", \"emission\": " + vector_json(m.emission) + ", \"transmission\": " + number_text(m.transmission) + ", \"ior\": " + number_text(m.ior) +
-         ", \"solid\": " + (m.solid ? "true" : "false") + ", \"unlit\": " + (m.unlit ? "true" : "false") + ", \"double_sided\": " + (m.double_sided ? "true" : "false") +
-         ", \"alpha_mode\": " + std::to_string(static_cast<int>(m.alpha_mode)) + ", \"textured\": " + (m.has_texture() ? "true" : "false") + "}";
+  return "{\"name\": " + quoted(m.name) + ", \"base_color\": " + vector_json(m.base_color) +
+         ", \"alpha\": " + number_text(m.alpha) + ", \"metallic\": " + number_text(m.metallic) +
+         ", \"roughness\": " + number_text(m.roughness) + ", \"emission\": " + vector_json(m.emission) +
+         ", \"transmission\": " + number_text(m.transmission) + ", \"ior\": " + number_text(m.ior) +
+         ", \"solid\": " + (m.solid ? "true" : "false") + ", \"unlit\": " + (m.unlit ? "true" : "false") +
+         ", \"double_sided\": " + (m.double_sided ? "true" : "false") +
+         ", \"alpha_mode\": " + std::to_string(static_cast<int>(m.alpha_mode)) +
+         ", \"textured\": " + (m.has_texture() ? "true" : "false") + "}";
 }
 
 std::string camera_json(const ln::Camera& c) {
-  return "{\"name\": " + quoted(c.name) + ", \"node\": " + quoted(c.node) + ", \"orthographic\": " + (c.orthographic ? "true" : "false") + ", \"position\": " + vector_json(c.position) +
-         ", \"forward\": " + vector_json(c.forward) + ", \"up\": " + vector_json(c.up) + ", \"yfov\": " + number_text(c.yfov) + ", \"ymag\": " + number_text(c.ymag) + "}";
+  return "{\"name\": " + quoted(c.name) + ", \"node\": " + quoted(c.node) +
+         ", \"orthographic\": " + (c.orthographic ? "true" : "false") + ", \"position\": " + vector_json(c.position) +
+         ", \"forward\": " + vector_json(c.forward) + ", \"up\": " + vector_json(c.up) + ", \"yfov\": " + number_text(c.yfov) +
+         ", \"ymag\": " + number_text(c.ymag) + "}";
 }
 
 std::string light_json(const ln::PunctualLight& l) {
   constexpr const char* kKinds[] = {"point", "spot", "directional"};
-  return "{\"name\": " + quoted(l.name) + ", \"kind\": \"" + kKinds[static_cast<int>(l.kind)] + "\", \"position\": " + vector_json(l.position) + ", \"direction\": " + vector_json(l.direction) +
+  return "{\"name\": " + quoted(l.name) + ", \"kind\": \"" + kKinds[static_cast<int>(l.kind)] +
+         "\", \"position\": " + vector_json(l.position) + ", \"direction\": " + vector_json(l.direction) +
          ", \"intensity\": " + vector_json(l.intensity) + "}";
 }
 
 std::string image_json(const ln::Image& i) {
-  return "{\"width\": " + std::to_string(i.width) + ", \"height\": " + std::to_string(i.height) + ", \"channels\": " + std::to_string(i.channels) + ", \"float\": " + (i.floats.empty() ? "false" : "true") +
+  return "{\"width\": " + std::to_string(i.width) + ", \"height\": " + std::to_string(i.height) +
+         ", \"channels\": " + std::to_string(i.channels) + ", \"float\": " + (i.floats.empty() ? "false" : "true") +
          ", \"srgb\": " + (i.srgb ? "true" : "false") + "}";
 }
 
 std::string part_json(const ln::Part& p) {
-  return "{\"mesh\": " + quoted(p.mesh) + ", \"node\": " + quoted(p.node) + ", \"material\": " + std::to_string(p.material) + ", \"triangles\": " + std::to_string(p.triangle_count) + "}";
+  return "{\"mesh\": " + quoted(p.mesh) + ", \"node\": " + quoted(p.node) + ", \"material\": " + std::to_string(p.material) +
+         ", \"triangles\": " + std::to_string(p.triangle_count) + "}";
 }
 
 /// Sums over all triangles that different encodings of one mesh must agree on: area and, by the divergence theorem, volume.
@@ -93,10 +102,13 @@ int main(int argc, char** argv) {
   }
   try {
     const ln::SceneData s = ln::load_gltf(argv[1]);
-    std::string out = "{" + peak_json() + ", \"triangles\": " + std::to_string(s.triangles.size()) + ", \"vertices\": " + std::to_string(s.positions.size()) + ", \"origin\": " + vector_json(s.origin) +
+    std::string out = "{" + peak_json() + ", \"triangles\": " + std::to_string(s.triangles.size()) +
+                      ", \"vertices\": " + std::to_string(s.positions.size()) + ", \"origin\": " + vector_json(s.origin) +
                       ", \"unit\": " + number_text(s.unit) + ",\n " + measures_json(s) + ",\n";
-    out += " \"parts\": " + list_json(s.parts, part_json) + ",\n \"materials\": " + list_json(s.materials, material_json) + ",\n \"images\": " + list_json(s.images, image_json);
-    out += ",\n \"cameras\": " + list_json(s.cameras, camera_json) + ",\n \"lights\": " + list_json(s.lights, light_json) + ",\n \"notes\": " + list_json(s.notes, quoted) + "}\n";
+    out += " \"parts\": " + list_json(s.parts, part_json) + ",\n \"materials\": " + list_json(s.materials, material_json) +
+           ",\n \"images\": " + list_json(s.images, image_json);
+    out += ",\n \"cameras\": " + list_json(s.cameras, camera_json) + ",\n \"lights\": " + list_json(s.lights, light_json) +
+           ",\n \"notes\": " + list_json(s.notes, quoted) + "}\n";
     std::fputs(out.c_str(), stdout);
   } catch (const ln::Error& error) {
     std::printf("{%s}\n", peak_json().c_str());

@@ -20,7 +20,8 @@ namespace ln {
 /// Throws Error with the cause alone. Alpha is not premultiplied.
 Image decode_image(std::span<const std::uint8_t> bytes, bool srgb, const std::function<void(double)>& claim = {});
 
-/// Reads an image file that the user named, such as a latitude-longitude environment. Throws Error "<path>: <cause>".
+/// Reads an image file that the user named, such as a latitude-longitude environment; colours of integer formats count as
+/// sRGB-encoded. Throws Error "<path>: <cause>".
 Image read_image_file(const std::string& path);
 
 }  // namespace ln

@@ -4,7 +4,8 @@
 // Coordinates are normalised: world position = origin + unit * position, where `origin` is the centre of the bounding box
 // of all triangles and `unit` a power of two such that its half diagonal lies in (1/2, 1]. Radiances and directional
 // intensities (irradiance) are independent of the unit; intensities of point and spot lights [W/sr] are stored divided
-// by unit^2, attenuation distances divided by unit.
+// by unit^2, attenuation distances divided by unit. A scene without triangles has origin 0 and unit 1; cameras and lights do
+// not count for the box and may stand anywhere.
 
 #include <array>
 #include <cstddef>
@@ -17,7 +18,8 @@ namespace ln {
 
 enum class Wrap : std::uint8_t { repeat, clamp, mirror };
 
-/// Decoded image: `width * height * channels` values, row 0 at the top (v = 0). 8-bit data stays 8-bit; everything else is float.
+/// Decoded image: `width * height * channels` values, row 0 at the top (v = 0). 8-bit data stays 8-bit; everything else is float,
+/// linear and finite. Alpha is not premultiplied.
 struct Image {
   int width = 0, height = 0, channels = 0;
   bool srgb = false;  // colour channels of 8-bit data are sRGB-encoded (alpha never is)
@@ -28,7 +30,7 @@ struct Image {
 /// A use of an image by a material; `image` < 0: none, the factor stands alone.
 struct TextureRef {
   int image = -1;
-  std::uint8_t uv_set = 0;
+  std::uint8_t uv_set = 0;  // index into SceneData::uvs
   Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;
   bool nearest = false;
   /// KHR_texture_transform as rows of a 2x3 matrix: u' = dot(row0, (u, v, 1)).
@@ -51,7 +53,7 @@ struct Material {
   float alpha_cutoff = 0.5f;
   bool double_sided = false;
   bool unlit = false;  // emits only, black BSDF
-  float ior = 1.5f;
+  float ior = 1.5f;    // at least 1; the 0 that glTF allows for "reflects everything" is read as 1e4
   float transmission = 0;
   bool solid = false;  // KHR_materials_volume with thickness > 0: the surface bounds a solid; otherwise thin-walled
   Color attenuation_color{1};
@@ -105,9 +107,9 @@ struct SceneData {
 
   std::vector<Vec3> positions;
   std::vector<UVec3> triangles;               // front side: counter-clockwise, also under mirroring transforms
-  std::vector<std::uint32_t> triangle_part;   // index into `parts`
+  std::vector<std::uint32_t> triangle_part;   // index into `parts`; parts come one after another
   // Vertex attributes, as long as `positions`, or empty where no part has them.
-  std::vector<Vec3> normals;                  // unit length; zero: the part has none, use the triangle's own
+  std::vector<Vec3> normals;                  // unit length; zero: the part or the vertex has none, use the triangle's own
   std::vector<Vec4> tangents;                 // w: handedness; zero: none
   std::vector<Vec2> uvs[2];
   std::vector<Vec4> colors;                   // linear; (1, 1, 1, 1) where a part has none

@@ -24,7 +24,8 @@ inline const auto kByteToLinear = [] {
 
 /// Texel (x, y) as linear RGBA; what the image does not have is filled up: grey counts for red, green and blue, alpha is 1.
 inline Vec4 texel(const Image& image, int x, int y) {
-  const std::size_t first = (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x)) * static_cast<std::size_t>(image.channels);
+  const std::size_t first = (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x)) *
+                            static_cast<std::size_t>(image.channels);
   const auto rgba = [&](auto color, auto alpha) -> Vec4 {
     switch (image.channels) {
       case 1: return Vec4(Vec3(color(0)), 1);
@@ -73,13 +74,17 @@ inline Vec4 lookup(const Image& image, const TextureRef& ref, const Vec2& uv) {
   const float x = wrap_coordinate(at.x, ref.wrap_s) * static_cast<float>(image.width);
   const float y = wrap_coordinate(at.y, ref.wrap_t) * static_cast<float>(image.height);
   if (ref.nearest) {
-    return texel(image, wrap_texel(static_cast<int>(x), image.width, ref.wrap_s), wrap_texel(static_cast<int>(y), image.height, ref.wrap_t));
+    return texel(image, wrap_texel(static_cast<int>(x), image.width, ref.wrap_s),
+                 wrap_texel(static_cast<int>(y), image.height, ref.wrap_t));
   }
   const float left = std::floor(x - 0.5f), top = std::floor(y - 0.5f);
   const float s = x - 0.5f - left, t = y - 0.5f - top;
-  const int x0 = wrap_texel(static_cast<int>(left), image.width, ref.wrap_s), x1 = wrap_texel(static_cast<int>(left) + 1, image.width, ref.wrap_s);
-  const int y0 = wrap_texel(static_cast<int>(top), image.height, ref.wrap_t), y1 = wrap_texel(static_cast<int>(top) + 1, image.height, ref.wrap_t);
-  return (texel(image, x0, y0) * (1 - s) + texel(image, x1, y0) * s) * (1 - t) + (texel(image, x0, y1) * (1 - s) + texel(image, x1, y1) * s) * t;
+  const int x0 = wrap_texel(static_cast<int>(left), image.width, ref.wrap_s),
+            x1 = wrap_texel(static_cast<int>(left) + 1, image.width, ref.wrap_s);
+  const int y0 = wrap_texel(static_cast<int>(top), image.height, ref.wrap_t),
+            y1 = wrap_texel(static_cast<int>(top) + 1, image.height, ref.wrap_t);
+  return (texel(image, x0, y0) * (1 - s) + texel(image, x1, y0) * s) * (1 - t) +
+         (texel(image, x0, y1) * (1 - s) + texel(image, x1, y1) * s) * t;
 }
 
 /// Bounds of the linear RGBA values of all texels, and so of all lookups.

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "ln/error.hpp"
+#include "ln/material.hpp"
 #include "ln/request.hpp"
 #include "ln/stats.hpp"
 
@@ -147,7 +148,14 @@ class ParticleChunk {
     photon.wi = pack_unit(at.wo);
     photon.normal = PackedNormal(at.front ? at.at.ng : -at.at.ng, at.front);
     photon.triangle = at.hit.triangle;
-    photon.flux = PackedColor(flux);
+    photon.flux = PackedColor(flux / share_that_is_there(at.hit));
+  }
+
+  /// Of a surface with partial coverage: the probability with which the particle hit it. Divided by it, photons have the
+  /// density of the irradiance where the surface is there.
+  float share_that_is_there(const Hit& hit) const {
+    if (hit.triangle < scene_.data().alpha_begin) return 1;
+    return std::max(coverage(scene_.data(), hit.triangle, hit.u, hit.v), 1e-3f);
   }
 
   /// Samples one of the events that lead on. Returns the state that it leads to, or -1: the path ends here. Smooth lobes

@@ -80,6 +80,16 @@ TEST_CASE("a plane under a directional light is evenly lit up to its border") {
   CHECK(e.mean([](Vec2 u) { return Vec3(0.7f - 0.01f * u.x, 0.01f, 0.01f * u.y - 0.7f); }, kUp) == doctest::Approx(truth).epsilon(0.05));
 }
 
+TEST_CASE("half of a surface sees the same light as all of it") {
+  SceneBuilder b;
+  b.quad({-0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, -0.7f}, {-0.7f, 0.01f, -0.7f}, b.material(Color(0.5f)));
+  b.data.materials.back().alpha_mode = AlphaMode::blend;
+  b.data.materials.back().alpha = 0.5f;
+  b.directional({0, -1, 0}, Color(1));
+  const Estimate e(b.data, 200'000);
+  CHECK(e.mean([](Vec2 u) { return Vec3(1.4f * u.x - 0.7f, 0.01f, 1.4f * u.y - 0.7f); }, kUp) == doctest::Approx(1).epsilon(0.02));
+}
+
 TEST_CASE("inside a finely divided sphere: Phi / (A (1 - rho))") {
   SceneBuilder b;
   b.sphere(Vec3(0), 0.8f, b.material(Color(0.5f), Color(1)), true, 60);

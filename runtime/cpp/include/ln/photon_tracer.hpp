@@ -53,8 +53,8 @@ struct Photons {
 };
 
 /// Traces `count` particles from `light` and keeps the hits at which the path so far matches `via` and the surface can
-/// scatter by D or G. The flux that is kept is weighted by |cos to the shading normal / cos to the geometric normal|, so
-/// that its density over the surface is the irradiance that the surface's BSDF sees.
+/// scatter by D or G. The flux that is kept is weighted by |cos to the shading normal / cos to the geometric normal| and by
+/// 1 / coverage, so that its density over the surface is the irradiance that the surface's BSDF sees.
 /// Same scene, seed and count: same bits, whatever the number of threads. Throws Error if the photons would take more than
 /// a third of the free memory.
 Photons trace_photons(PrepareContext& context, NodeId node, const Emitters& light, const PathAutomaton& via, std::uint64_t count);

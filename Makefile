@@ -13,12 +13,12 @@ check: lint types test-fast  ## format, lint, types and the fast tests
 
 format:  ## format Python and the networks
 	$(PYTHON) -m ruff format conftest.py lnc tests benchmarks ops_library examples
-	.venv/bin/lnc fmt examples/*.ln
+	$(PYTHON) -m lnc fmt examples/*.ln
 
 lint:  ## formatting and common mistakes
 	$(PYTHON) -m ruff format --check conftest.py lnc tests benchmarks ops_library examples
 	$(PYTHON) -m ruff check conftest.py lnc tests benchmarks ops_library examples
-	.venv/bin/lnc fmt --check examples/*.ln
+	$(PYTHON) -m lnc fmt --check examples/*.ln
 
 types:  ## mypy
 	$(PYTHON) -m mypy lnc

@@ -17,15 +17,9 @@ bool emission_varies(const Part& part, const Material& material) {
 /// A triangle of the scene as a light; size 0: it has no area that float can express.
 AreaLight triangle_light(const SceneData& scene, std::uint32_t triangle) {
   const UVec3 i = scene.triangles[triangle];
-  const glm::dvec3 a(scene.positions[i.x]), b(scene.positions[i.y]), c(scene.positions[i.z]);
-  const glm::dvec3 normal = glm::cross(b - a, c - a);
-  const double size = glm::length(normal);
-  AreaLight light;
+  const Vec3 a = scene.positions[i.x];
+  AreaLight light(a, DVec3(scene.positions[i.y]) - DVec3(a), DVec3(scene.positions[i.z]) - DVec3(a), false);
   light.triangle = triangle;
-  if (!(size > 1e-37) || !std::isfinite(size)) return light;
-  light.a = Vec3(a), light.e1 = Vec3(b - a), light.e2 = Vec3(c - a);
-  light.n = Vec3(normal / size);
-  light.size = static_cast<float>(size);
   return light;
 }
 
@@ -42,15 +36,8 @@ AreaLight parallelogram_light(const SceneData& scene, std::uint32_t first, std::
       const Vec3 tolerance = 0x1p-21f * (glm::abs(x) + glm::abs(y) + glm::abs(z));
       const float extent = std::max(glm::distance(x, y), glm::distance(x, z));
       if (glm::any(glm::greaterThan(gap, tolerance)) || max_component(gap) > 1e-4f * extent) return {};
-      const glm::dvec3 e1 = glm::dvec3(y) - glm::dvec3(x), e2 = glm::dvec3(z) - glm::dvec3(x), normal = glm::cross(e1, e2);
-      const double size = glm::length(normal);
-      AreaLight light;
+      AreaLight light(x, DVec3(y) - DVec3(x), DVec3(z) - DVec3(x), true);
       light.triangle = first;
-      if (!(size > 1e-37) || !std::isfinite(size)) return light;
-      light.a = x, light.e1 = Vec3(e1), light.e2 = Vec3(e2);
-      light.n = Vec3(normal / size);
-      light.size = static_cast<float>(size);
-      light.quad = true;
       return light;
     }
   }
@@ -93,7 +80,9 @@ Emitters::Emitters(const SceneData& scene, const Image* environment, const Emitt
     environment_ = std::make_unique<Environment>(*environment);
     if (environment_->is_black()) environment_.reset();
   }
-  size_ = area_.size() + punctual_.size() + distant_.size() + (has_environment() ? 1 : 0);
+  area_count_ = static_cast<std::uint32_t>(area_.size());
+  finite_count_ = static_cast<std::uint32_t>(area_.size() + punctual_.size());
+  size_ = finite_count_ + distant_.size() + (has_environment() ? 1 : 0);
   build_tree();
   build_power();
 }
@@ -146,7 +135,8 @@ void Emitters::add_lights(const EmitterSelection& selection) {
     switch (light.kind) {
       case PunctualKind::point: punctual_.push_back({light.position, light.direction, light.intensity}); break;
       case PunctualKind::spot:
-        punctual_.push_back(PunctualSource::spot(light.position, light.direction, light.intensity, light.cos_inner, light.cos_outer));
+        punctual_.push_back(
+            PunctualSource::spot(light.position, light.direction, light.intensity, light.cos_inner, light.cos_outer));
         break;
       case PunctualKind::directional: distant_.push_back({light.direction, light.intensity}); break;
     }
@@ -154,9 +144,9 @@ void Emitters::add_lights(const EmitterSelection& selection) {
 }
 
 void Emitters::build_tree() {
-  if (size() < 2 || finite_count() == 0) return;
+  if (size() < 2 || finite_count_ == 0) return;
   std::vector<LightBounds> bounds;
-  bounds.reserve(finite_count());
+  bounds.reserve(finite_count_);
   for (const AreaLight& light : area_) {
     LightBounds b;
     bound(light, b);
@@ -217,7 +207,7 @@ float Emitters::distant_importance(const DistantLight& light, const Vec3& n) con
 
 Emitters::Choice Emitters::choose(const Vec3& p, const Vec3& n) const {
   Choice choice;
-  if (finite_count() > 0) {
+  if (finite_count_ > 0) {
     choice.root = tree_.root(p, n);
     choice.finite = choice.root.total();
   }
@@ -244,9 +234,29 @@ Emitters::Choice Emitters::choose(const Vec3& p, const Vec3& n) const {
   return choice;
 }
 
+LN_INLINE LightSample Emitters::sample_area(const SurfacePosition& at, const AreaLight& light, float pmf, const Vec2& u) const {
+  LightSample result;
+  const float height = light.height(at.p);
+  if (!light.seen_from(height)) return result;
+  const AreaSample s = sample_solid_angle(light, at.p, height, u);
+  result.position = light.at(s.s, s.t);
+  const Vec3 d = result.position.p - at.p;
+  result.distance = glm::length(d);
+  if (!(s.pdf_w > 0 && s.pdf_w < kInfinity && result.distance > 0)) return result;
+  result.wi = d / result.distance;
+  result.radiance = light.varies ? varying_radiance(light.triangle, s.s, s.t) : light.radiance;
+  result.pdf_w = pmf * s.pdf_w;
+  return result;
+}
+
 LightSample Emitters::sample(const SurfacePosition& at, const Vec3& n, float u_pick, const Vec2& u) const {
-  if (size() == 1) {
-    if (finite_count() == 1) return sample_finite(at, 0, 1, u);
+  if (size_ == 1 && area_count_ == 1) return sample_area(at, area_[0], 1, u);
+  return sample_several(at, n, u_pick, u);
+}
+
+LN_NOINLINE LightSample Emitters::sample_several(const SurfacePosition& at, const Vec3& n, float u_pick, const Vec2& u) const {
+  if (size_ == 1) {
+    if (finite_count_ == 1) return sample_finite(at, 0, 1, u);
     return environment_ ? sample_environment(n, 1, u) : sample_distant(n, u_pick, 1, distant_importance(distant_[0], n));
   }
   if (empty()) return {};
@@ -259,38 +269,25 @@ LightSample Emitters::sample(const SurfacePosition& at, const Vec3& n, float u_p
   // Rounding may leave u behind the last group that has light.
   if (choice.environment == 0 || u_pick < choice.finite + choice.distant) {
     if (choice.distant == 0) return {};
-    return sample_distant(n, std::min((u_pick - choice.finite) / choice.distant, kOneMinusEpsilon), choice.distant, choice.distant_importance);
+    return sample_distant(n, std::min((u_pick - choice.finite) / choice.distant, kOneMinusEpsilon), choice.distant,
+                          choice.distant_importance);
   }
   return sample_environment(n, choice.environment, u);
 }
 
 LightSample Emitters::sample_finite(const SurfacePosition& at, std::uint32_t index, float pmf, const Vec2& u) const {
+  if (index < area_count_) return sample_area(at, area_[index], pmf, u);
+  const PunctualSource& light = punctual_[index - area_count_];
   LightSample result;
-  if (index < area_.size()) {
-    const AreaLight& light = area_[index];
-    const float height = light.height(at.p);
-    if (!light.seen_from(height)) return {};
-    const AreaSample s = sample_solid_angle(light, at.p, height, u);
-    if (!(s.pdf_w > 0)) return {};
-    result.position = light.at(s.s, s.t);
-    result.radiance = light.varies ? varying_radiance(light.triangle, s.s, s.t) : light.radiance;
-    result.pdf_w = pmf * s.pdf_w;
-  } else {
-    const PunctualSource& light = punctual_[index - area_.size()];
-    result.position = {light.position, 0, Vec3(0)};
-    result.radiance = light.intensity;
-    result.pdf_w = pmf;
-    result.delta = true;
-  }
-  const Vec3 d = result.position.p - at.p;
+  const Vec3 d = light.position - at.p;
   const float d2 = glm::dot(d, d);
+  if (!(d2 > 1e-30f)) return result;
+  result.position = {light.position, 0, Vec3(0)};
   result.distance = std::sqrt(d2);
-  if (!(result.distance > 0) || !(result.pdf_w < kInfinity)) return {};
   result.wi = d / result.distance;
-  if (result.delta) {
-    const PunctualSource& light = punctual_[index - area_.size()];
-    result.radiance *= light.attenuation(-glm::dot(result.wi, light.direction)) / d2;
-  }
+  result.radiance = light.intensity * (light.attenuation(-glm::dot(result.wi, light.direction)) / d2);
+  result.pdf_w = pmf;
+  result.delta = true;
   return result;
 }
 
@@ -389,7 +386,8 @@ Color Emitters::mean_radiance(std::uint32_t triangle, int most_samples) const {
     const Image& image = scene_->images[ref.image];
     const auto texel = [&](std::uint32_t k) {
       const Vec3 uv(uvs[k], 1);
-      return Vec2(glm::dot(ref.row0, uv) * static_cast<float>(image.width), glm::dot(ref.row1, uv) * static_cast<float>(image.height));
+      return Vec2(glm::dot(ref.row0, uv) * static_cast<float>(image.width),
+                  glm::dot(ref.row1, uv) * static_cast<float>(image.height));
     };
     const Vec2 a = texel(i.x), b = texel(i.y), c = texel(i.z);
     const Vec2 extent = glm::max(a, glm::max(b, c)) - glm::min(a, glm::min(b, c));
@@ -399,7 +397,8 @@ Color Emitters::mean_radiance(std::uint32_t triangle, int most_samples) const {
   glm::dvec3 sum(0);
   for (int y = 0; y < n; ++y) {
     for (int x = 0; x < n; ++x) {
-      float u = (static_cast<float>(x) + 0.5f) / static_cast<float>(n), v = (static_cast<float>(y) + 0.5f) / static_cast<float>(n);
+      float u = (static_cast<float>(x) + 0.5f) / static_cast<float>(n),
+            v = (static_cast<float>(y) + 0.5f) / static_cast<float>(n);
       if (u + v > 1) u = 1 - u, v = 1 - v;
       sum += glm::dvec3(varying_radiance(triangle, u, v));
     }

@@ -50,7 +50,8 @@ Environment::Environment(const Image& image) : image_(&image) {
   std::vector<Color> row(width);
   const auto load = [&](int y) {
     for (int x = 0; x < width; ++x) row[x] = light_of(x, y);
-    const RowWeights up = row_weights(std::max(y - 1, 0), step), own = row_weights(y, step), down = row_weights(std::min(y + 1, height - 1), step);
+    const RowWeights up = row_weights(std::max(y - 1, 0), step), own = row_weights(y, step),
+                     down = row_weights(std::min(y + 1, height - 1), step);
     const double share = own.own + (y > 0 ? up.below : own.above) + (y < height - 1 ? down.above : own.below);
     ring[y % 3].resize(width);
     for (int x = 0; x < width; ++x) {
@@ -64,7 +65,8 @@ Environment::Environment(const Image& image) : image_(&image) {
   for (int y = 0; y < height; ++y) {
     if (y + 1 < height) load(y + 1);
     const RowWeights w = row_weights(y, step);
-    const std::vector<double>&above = ring[std::max(y - 1, 0) % 3], &own = ring[y % 3], &below = ring[std::min(y + 1, height - 1) % 3];
+    const std::vector<double>&above = ring[std::max(y - 1, 0) % 3], &own = ring[y % 3],
+          &below = ring[std::min(y + 1, height - 1) % 3];
     for (int x = 0; x < width; ++x) cells[x] = w.above * above[x] + w.own * own[x] + w.below * below[x];
     columns_.emplace_back(cells);
     rows[y] = columns_.back().total();
@@ -81,7 +83,8 @@ Color Environment::light_of(int x, int y) const {
 
 Vec2 Environment::picture_position(const Vec3& w) const {
   const float theta = std::atan2(std::sqrt(w.x * w.x + w.z * w.z), w.y), phi = std::atan2(w.x, w.z);
-  return {(0.5f - phi * (0.5f * kInvPi)) * static_cast<float>(image_->width), theta * kInvPi * static_cast<float>(image_->height)};
+  return {(0.5f - phi * (0.5f * kInvPi)) * static_cast<float>(image_->width),
+          theta * kInvPi * static_cast<float>(image_->height)};
 }
 
 Color Environment::interpolated(const Vec3& w) const {
@@ -93,7 +96,8 @@ Color Environment::interpolated(const Vec3& w) const {
   if (x0 >= width) x0 -= width;
   if (x1 >= width) x1 -= width;
   const int y0 = std::clamp(static_cast<int>(y), 0, height - 1), y1 = std::clamp(static_cast<int>(y) + 1, 0, height - 1);
-  const Color top = (1 - fx) * light_of(x0, y0) + fx * light_of(x1, y0), bottom = (1 - fx) * light_of(x0, y1) + fx * light_of(x1, y1);
+  const Color top = (1 - fx) * light_of(x0, y0) + fx * light_of(x1, y0),
+              bottom = (1 - fx) * light_of(x0, y1) + fx * light_of(x1, y1);
   return (1 - fy) * top + fy * bottom;
 }
 
@@ -121,7 +125,8 @@ Environment::Sample Environment::sample(const Vec2& u) const {
 float Environment::pdf_w(const Vec3& w) const {
   if (constant_) return is_black() ? 0.0f : 0.25f * kInvPi;
   const Vec2 at = picture_position(w);
-  const int x = std::clamp(static_cast<int>(at.x), 0, image_->width - 1), y = std::clamp(static_cast<int>(at.y), 0, image_->height - 1);
+  const int x = std::clamp(static_cast<int>(at.x), 0, image_->width - 1),
+            y = std::clamp(static_cast<int>(at.y), 0, image_->height - 1);
   return rows_.pmf(y) == 0 ? 0.0f : rows_.pmf(y) * columns_[y].pmf(x) / pixel_solid_angle_[y];
 }
 

@@ -40,7 +40,8 @@ struct Summary {
 
 class Builder {
  public:
-  explicit Builder(const std::vector<LightBounds>& lights, double scale) : lights_(lights), order_(lights.size()), summaries_(lights.size()) {
+  explicit Builder(const std::vector<LightBounds>& lights, double scale)
+      : lights_(lights), order_(lights.size()), summaries_(lights.size()) {
     std::iota(order_.begin(), order_.end(), 0u);
     for (std::size_t i = 0; i < lights.size(); ++i) {
       const LightBounds& l = lights[i];
@@ -50,7 +51,8 @@ class Builder {
       s.phi = l.phi / scale;
       s.axes = 0.5f * (1 + l.cos_o) * static_cast<float>(s.phi) * l.axis;
       // The two faces of a light have no common direction; compare them by one of the two.
-      if (l.two_sided && (l.axis.z < 0 || (l.axis.z == 0 && (l.axis.y < 0 || (l.axis.y == 0 && l.axis.x < 0))))) s.axes = -s.axes;
+      if (l.two_sided && (l.axis.z < 0 || (l.axis.z == 0 && (l.axis.y < 0 || (l.axis.y == 0 && l.axis.x < 0)))))
+        s.axes = -s.axes;
       s.count = 1;
     }
   }
@@ -81,7 +83,9 @@ class Builder {
       for (std::size_t i = 0; i < parts.size(); ++i) {
         const auto count = [&](std::size_t k) { return parts[k].end - parts[k].begin; };
         if (count(i) < 2) continue;
-        if (best == parts.size() || parts[i].cost > parts[best].cost || (parts[i].cost == parts[best].cost && count(i) > count(best))) best = i;
+        if (best == parts.size() || parts[i].cost > parts[best].cost ||
+            (parts[i].cost == parts[best].cost && count(i) > count(best)))
+          best = i;
       }
       if (best == parts.size()) break;
       const Range whole = parts[best];
@@ -162,8 +166,9 @@ class Builder {
     }
     if (best_axis < 0) return half;
     const float low = centers.low[best_axis], width = centers.high[best_axis] - low;
-    const auto middle = std::stable_partition(order_.begin() + begin, order_.begin() + end,
-                                              [&](std::uint32_t i) { return bin(i, best_axis, low, width, bins_used) <= best_bin; });
+    const auto middle = std::stable_partition(order_.begin() + begin, order_.begin() + end, [&](std::uint32_t i) {
+      return bin(i, best_axis, low, width, bins_used) <= best_bin;
+    });
     return static_cast<std::uint32_t>(middle - order_.begin());
   }
 

@@ -69,8 +69,10 @@ TEST_CASE("irradiance of polygons: Lambert's formula") {
       CAPTURE(name);
       CAPTURE(quad);
       SceneOfLights scene;
-      if (quad) scene.add_quad(c.a, c.e1, c.e2, radiance, true);
-      else scene.add_triangle(c.a, c.a + c.e1, c.a + c.e2, radiance, true);
+      if (quad)
+        scene.add_quad(c.a, c.e1, c.e2, radiance, true);
+      else
+        scene.add_triangle(c.a, c.a + c.e1, c.a + c.e2, radiance, true);
       const Emitters emitters(scene.data);
       CHECK(emitters.size() == 1);
       const Color e = irradiance(emitters, c.p, n, 256, 21), exact = brute_force(scene, c.p, n);
@@ -128,7 +130,8 @@ TEST_CASE("probabilities of all emitters add up to one wherever some light can a
     for (std::uint32_t t = 0; t < scene.data.triangles.size(); ++t) {
       const UVec3 k = scene.data.triangles[t];
       const float pdf_w = emitters.pdf_w(at, n, hit_of(t), glm::normalize(scene.data.positions[k.x] - p));
-      const double solid = triangle_solid_angle(scene.data.positions[k.x], scene.data.positions[k.y], scene.data.positions[k.z], p);
+      const double solid =
+          triangle_solid_angle(scene.data.positions[k.x], scene.data.positions[k.y], scene.data.positions[k.z], p);
       pmf[t] = static_cast<double>(pdf_w) * solid;
       surfaces += pmf[t];
     }
@@ -169,9 +172,11 @@ TEST_CASE("pdf_w is the density of sample") {
     bool found = false;
     for (std::uint32_t t = 0; t < scene.data.triangles.size() && !found; ++t) {
       const UVec3 k = scene.data.triangles[t];
-      const DVec3 a(scene.data.positions[k.x]), e1 = DVec3(scene.data.positions[k.y]) - a, e2 = DVec3(scene.data.positions[k.z]) - a;
+      const DVec3 a(scene.data.positions[k.x]), e1 = DVec3(scene.data.positions[k.y]) - a,
+                                                e2 = DVec3(scene.data.positions[k.z]) - a;
       const DVec3 d = DVec3(s.position.p) - a, c = glm::cross(e1, e2);
-      const double area2 = glm::dot(c, c), u = glm::dot(glm::cross(d, e2), c) / area2, v = glm::dot(glm::cross(e1, d), c) / area2;
+      const double area2 = glm::dot(c, c), u = glm::dot(glm::cross(d, e2), c) / area2,
+                   v = glm::dot(glm::cross(e1, d), c) / area2;
       if (std::abs(glm::dot(d, c)) / std::sqrt(area2) > 1e-6 || u < -1e-3 || v < -1e-3 || u + v > 1.001) continue;
       found = true;
       const Hit hit{s.distance, t, static_cast<float>(u), static_cast<float>(v)};
@@ -192,7 +197,8 @@ TEST_CASE("a thousand lights: unbiased") {
     double sum = 0, squares = 0;
     for (int i = 0; i < kCount; ++i) {
       const LightSample s = emitters.sample(receiver(p, n), n, random(), random.square());
-      const double x = s.pdf_w > 0 ? static_cast<double>(mean_component(s.radiance) * std::max(0.0f, glm::dot(n, s.wi)) / s.pdf_w) : 0.0;
+      const double x =
+          s.pdf_w > 0 ? static_cast<double>(mean_component(s.radiance) * std::max(0.0f, glm::dot(n, s.wi)) / s.pdf_w) : 0.0;
       sum += x;
       squares += x * x;
     }
@@ -207,7 +213,8 @@ TEST_CASE("a thousand lights: far less variance than if chosen by power") {
   constexpr float kSize = 0.02f;
   for (int i = 0; i < 1000; ++i) {
     const Vec3 center = 0.55f * random.cube();
-    scene.add_triangle(center, center + kSize * random.direction(), center + kSize * random.direction(), Color(std::pow(10.0f, 3 * random())));
+    scene.add_triangle(center, center + kSize * random.direction(), center + kSize * random.direction(),
+                       Color(std::pow(10.0f, 3 * random())));
   }
   const Emitters emitters(scene.data);
   double by_importance = 0, by_power = 0, worst = 0;
@@ -224,7 +231,8 @@ TEST_CASE("a thousand lights: far less variance than if chosen by power") {
       power_sum += power;
       const double e = glm::dot(ng, p - corners[0]) > 0 ? radiance * polygon_irradiance(corners, p, n) : 0.0;
       if (e == 0) continue;
-      const double pmf = static_cast<double>(emitters.pdf_w(receiver(p), n, hit_of(t), n)) * triangle_solid_angle(corners[0], corners[1], corners[2], p);
+      const double pmf = static_cast<double>(emitters.pdf_w(receiver(p), n, hit_of(t), n)) *
+                         triangle_solid_angle(corners[0], corners[1], corners[2], p);
       e_sum += e;
       importance_squares += e * e / pmf;
       power_squares += e * e / power;
@@ -244,15 +252,18 @@ TEST_CASE("no light that contributes is excluded, wherever the receiver is") {
   SceneOfLights scene;
   Random random(61);
   // A cluttered set: some in one plane, some in one place, some facing each other.
-  for (int i = 0; i < 40; ++i) scene.add_triangle({0.1f * (i % 7), 0.1f * (i / 7), 0.5f}, {0.1f * (i % 7), 0.1f * (i / 7) + 0.08f, 0.5f}, {0.1f * (i % 7) + 0.08f, 0.1f * (i / 7), 0.5f}, Color(1));
+  for (int i = 0; i < 40; ++i)
+    scene.add_triangle({0.1f * (i % 7), 0.1f * (i / 7), 0.5f}, {0.1f * (i % 7), 0.1f * (i / 7) + 0.08f, 0.5f},
+                       {0.1f * (i % 7) + 0.08f, 0.1f * (i / 7), 0.5f}, Color(1));
   for (int i = 0; i < 20; ++i) scene.add_triangle({0, 0, 0.2f}, {0.1f, 0, 0.2f}, {0, 0.1f, 0.2f}, Color(2));
-  for (int i = 0; i < 20; ++i) scene.add_triangle({-0.5f, 0.05f * i, 0}, {-0.5f, 0.05f * i, 0.3f}, {-0.5f, 0.05f * i + 0.04f, 0.3f}, Color(2), i % 2 == 0);
+  for (int i = 0; i < 20; ++i)
+    scene.add_triangle({-0.5f, 0.05f * i, 0}, {-0.5f, 0.05f * i, 0.3f}, {-0.5f, 0.05f * i + 0.04f, 0.3f}, Color(2), i % 2 == 0);
   const Emitters emitters(scene.data);
   for (int i = 0; i < 4000; ++i) {
     Vec3 p = 0.7f * random.cube(), n = random.direction();
-    if (i % 4 == 1) p.z = 0.5f;                                        // in the plane of many
-    if (i % 4 == 2) p = {-0.5f + 1e-6f * random(), random(), 0.1f};    // just in front of some
-    if (i % 4 == 3) p = {0.02f, 0.02f, 0.2f - 1e-5f * random()};       // inside the bounds of the stack
+    if (i % 4 == 1) p.z = 0.5f;                                      // in the plane of many
+    if (i % 4 == 2) p = {-0.5f + 1e-6f * random(), random(), 0.1f};  // just in front of some
+    if (i % 4 == 3) p = {0.02f, 0.02f, 0.2f - 1e-5f * random()};     // inside the bounds of the stack
     if (i % 5 == 0) n = {0, 0, 1};
     if (i % 11 == 0) n = Vec3(0);
     const SurfacePosition at = receiver(p, n);
@@ -286,7 +297,8 @@ TEST_CASE("no spot that reaches the receiver is excluded") {
     SceneOfLights scene;
     const Vec3 p = 0.5f * random.cube();
     for (int k = 0; k < 20; ++k) {
-      const Vec3 position = random.cube(), axis = random.direction(), side = glm::normalize(glm::cross(axis, random.direction()));
+      const Vec3 position = random.cube(), axis = random.direction(),
+                 side = glm::normalize(glm::cross(axis, random.direction()));
       const float angle = 0.199f * random();
       scene.add_spot(position, std::cos(angle) * axis + std::sin(angle) * side, Color(1), 0.1f, 0.2f);
       if (k == 0) scene.data.lights[0].position = p - 0.5f * axis;
@@ -336,12 +348,14 @@ TEST_CASE("surfaces emit on the front, on both sides where they are double-sided
   CHECK(emitters.environment_pdf_w(receiver({}), up, up) == 0);
 
   // A selection knows only its own.
-  const Emitters second(scene.data, nullptr, [](std::size_t part) { return part == 1; }, [](std::size_t) { return false; });
+  const Emitters second(
+      scene.data, nullptr, [](std::size_t part) { return part == 1; }, [](std::size_t) { return false; });
   CHECK(second.size() == 1);
   CHECK(second.radiance(hit_of(0), up) == Color(0));
   CHECK(second.radiance(hit_of(1), up) == Color(4));
   CHECK(second.pdf_w(receiver({0.1f, 0.1f, 0.1f}), Vec3(0), hit_of(0), up) == 0);
-  const Emitters none(scene.data, nullptr, [](std::size_t) { return false; }, [](std::size_t) { return false; });
+  const Emitters none(
+      scene.data, nullptr, [](std::size_t) { return false; }, [](std::size_t) { return false; });
   CHECK(none.empty());
   CHECK(!none.has_area());
   CHECK(none.sample(receiver({}), up, 0.5f, {0.5f, 0.5f}).pdf_w == 0);
@@ -378,13 +392,15 @@ TEST_CASE("emission that varies over a surface: textures, and colours of unlit s
   CHECK(emitters.total_power().x == doctest::Approx(4 * mean * kPi * 0.08).epsilon(0.1));
   Random random(81);
   double flux = 0;
-  for (int i = 0; i < 100000; ++i) flux += static_cast<double>(emitters.emit(random(), random.square(), random.square()).flux.x) / 100000;
+  for (int i = 0; i < 100000; ++i)
+    flux += static_cast<double>(emitters.emit(random(), random.square(), random.square()).flux.x) / 100000;
   CHECK(flux == doctest::Approx(4 * mean * kPi * 0.08).epsilon(0.02));
   for (int i = 0; i < 1000; ++i) {
     const LightSample s = emitters.sample(receiver({0, 0, 0}), -down, random(), random.square());
     CHECK(s.pdf_w > 0);
     const float v = s.position.p.x / 0.4f, u = s.position.p.y / 0.4f;
-    if (std::abs(v - 0.5f) > 1e-4f) CHECK(s.radiance.x == doctest::Approx(emitters.radiance(hit_of(0, u, v), down).x).epsilon(1e-4));
+    if (std::abs(v - 0.5f) > 1e-4f)
+      CHECK(s.radiance.x == doctest::Approx(emitters.radiance(hit_of(0, u, v), down).x).epsilon(1e-4));
   }
 }
 

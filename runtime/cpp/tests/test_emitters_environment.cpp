@@ -27,7 +27,8 @@ Image gradient(int width, int height) {
   Image image = make_image(width, height, Color(0));
   Random random(3);
   for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) set(image, x, y, Color(random(), 2 * random(), 3 * random()) * (y < height / 2 ? 1.0f : 0.1f));
+    for (int x = 0; x < width; ++x)
+      set(image, x, y, Color(random(), 2 * random(), 3 * random()) * (y < height / 2 ? 1.0f : 0.1f));
   return image;
 }
 
@@ -84,7 +85,8 @@ TEST_CASE("samples follow the density, which covers all light and integrates to 
     constexpr int kCount = 200000;
     for (int y = 0; y < kY * kSub; ++y) {
       for (int x = 0; x < kX * kSub; ++x) {
-        const double theta = kPi * (y + 0.5) / (kY * kSub), cell = 2 * kPi / (kX * kSub) * (kPi / (kY * kSub)) * std::sin(theta);
+        const double theta = kPi * (y + 0.5) / (kY * kSub),
+                     cell = 2 * kPi / (kX * kSub) * (kPi / (kY * kSub)) * std::sin(theta);
         const double phi = 2 * kPi * (x + 0.5) / (kX * kSub);
         const Vec3 w(std::sin(theta) * std::sin(phi), std::cos(theta), std::sin(theta) * std::cos(phi));
         const double p = static_cast<double>(env.pdf_w(w)) * cell;
@@ -147,7 +149,8 @@ TEST_CASE("one bright pixel: irradiance, and no noise to speak of") {
       const float px = 99 + (static_cast<float>(x) + 0.5f) / kSub, py = 19 + (static_cast<float>(y) + 0.5f) / kSub;
       const double theta = kPi * static_cast<double>(py) / 128;
       const Vec3 w = direction_at(image, px, py);
-      e += glm::dvec3(emitters.environment(w) - Color(0.01f)) * static_cast<double>(w.y) * std::sin(theta) * (2.0 * kPi / 256 / kSub) * (1.0 * kPi / 128 / kSub);
+      e += glm::dvec3(emitters.environment(w) - Color(0.01f)) * static_cast<double>(w.y) * std::sin(theta) *
+           (2.0 * kPi / 256 / kSub) * (1.0 * kPi / 128 / kSub);
     }
   }
   e += glm::dvec3(0.01 * kPi);

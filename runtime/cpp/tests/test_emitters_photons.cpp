@@ -38,9 +38,10 @@ TEST_CASE("the mean flux of particles is the power of all emitters") {
   SUBCASE("without environment") {
     const Emitters emitters(scene.data);
     const double r2 = 0.33 * 1.0005;  // (0.2^2 + 0.2^2 + 0.5^2), with the margin
-    CHECK(emitters.total_power().x == doctest::Approx(kPi * (0.16 * 3 + 0.125 * 2 * 1) + 4 * kPi * 0.1 +
-                                                      2 * kPi * (1 - std::cos(0.2) + (std::cos(0.2) - std::cos(0.5)) / 3) + 0.5 * kPi * r2)
-                                          .epsilon(1e-4));
+    CHECK(emitters.total_power().x ==
+          doctest::Approx(kPi * (0.16 * 3 + 0.125 * 2 * 1) + 4 * kPi * 0.1 +
+                          2 * kPi * (1 - std::cos(0.2) + (std::cos(0.2) - std::cos(0.5)) / 3) + 0.5 * kPi * r2)
+              .epsilon(1e-4));
     const MeanFlux flux = mean_flux(emitters, 400000, 1);
     CHECK(std::abs(static_cast<double>(flux.mean.x - emitters.total_power().x)) < 4 * flux.error + 1e-6);
     CHECK(flux.mean.z == doctest::Approx(emitters.total_power().z).epsilon(0.01));
@@ -61,8 +62,10 @@ TEST_CASE("surfaces emit uniformly over their area and by the cosine, on their b
     for (const bool double_sided : {false, true}) {
       SceneOfLights scene;
       const Vec3 a(-0.3f, 0.1f, 0.2f), e1(0.6f, 0.1f, 0), e2(0, 0.4f, 0.3f);
-      if (quad) scene.add_quad(a, e1, e2, Color(1), double_sided);
-      else scene.add_triangle(a, a + e1, a + e2, Color(1), double_sided);
+      if (quad)
+        scene.add_quad(a, e1, e2, Color(1), double_sided);
+      else
+        scene.add_triangle(a, a + e1, a + e2, Color(1), double_sided);
       const Emitters emitters(scene.data);
       const Vec3 n = glm::normalize(glm::cross(e1, e2));
       constexpr int kCells = 8, kCount = 100000;
@@ -73,19 +76,24 @@ TEST_CASE("surfaces emit uniformly over their area and by the cosine, on their b
         const PhotonEmission photon = emitters.emit(random(), random.square(), random.square());
         const float cosine = glm::dot(photon.direction, n);
         if (cosine < 0) ++back;
-        const bool right = !photon.delta && !photon.distant && photon.triangle == 0 && std::abs(glm::length(photon.direction) - 1) < 1e-5f &&
+        const bool right = !photon.delta && !photon.distant && photon.triangle == 0 &&
+                           std::abs(glm::length(photon.direction) - 1) < 1e-5f &&
                            std::abs(std::abs(cosine) - photon.cos_theta) < 1e-4f &&
                            std::abs(photon.flux.x / emitters.total_power().x - 1) < 1e-5f;
         wrong += right ? 0 : 1;
         angle[static_cast<std::size_t>(std::min(static_cast<int>(sqr(photon.cos_theta) * 20), 19))] += 1;
         const DVec3 d = DVec3(photon.position.p) - DVec3(a), c = glm::cross(DVec3(e1), DVec3(e2));
-        const double s = glm::dot(glm::cross(d, DVec3(e2)), c) / glm::dot(c, c), t = glm::dot(glm::cross(DVec3(e1), d), c) / glm::dot(c, c);
-        place[static_cast<std::size_t>(std::clamp(static_cast<int>(t * kCells), 0, kCells - 1) * kCells + std::clamp(static_cast<int>(s * kCells), 0, kCells - 1))] += 1;
+        const double s = glm::dot(glm::cross(d, DVec3(e2)), c) / glm::dot(c, c),
+                     t = glm::dot(glm::cross(DVec3(e1), d), c) / glm::dot(c, c);
+        place[static_cast<std::size_t>(std::clamp(static_cast<int>(t * kCells), 0, kCells - 1) * kCells +
+                                       std::clamp(static_cast<int>(s * kCells), 0, kCells - 1))] += 1;
       }
       for (int y = 0; y < kCells; ++y)
         for (int x = 0; x < kCells; ++x)
-          expected_place[static_cast<std::size_t>(y * kCells + x)] =
-              quad ? kCount / 64.0 : x + y < kCells - 1 ? kCount / 32.0 : x + y == kCells - 1 ? kCount / 64.0 : 0.0;
+          expected_place[static_cast<std::size_t>(y * kCells + x)] = quad                  ? kCount / 64.0
+                                                                     : x + y < kCells - 1  ? kCount / 32.0
+                                                                     : x + y == kCells - 1 ? kCount / 64.0
+                                                                                           : 0.0;
       if (!quad) {
         for (int y = 0; y < kCells; ++y) {  // rounding across the long edge
           for (int x = kCells - y; x < kCells; ++x) {
@@ -98,8 +106,10 @@ TEST_CASE("surfaces emit uniformly over their area and by the cosine, on their b
       CHECK(chi_square_accepts(place, expected_place));
       std::fill(expected_angle.begin(), expected_angle.end(), kCount / 20.0);
       CHECK(chi_square_accepts(angle, expected_angle));
-      if (double_sided) CHECK(std::abs(back - kCount / 2) < 4 * std::sqrt(kCount / 4.0));
-      else CHECK(back == 0);
+      if (double_sided)
+        CHECK(std::abs(back - kCount / 2) < 4 * std::sqrt(kCount / 4.0));
+      else
+        CHECK(back == 0);
     }
   }
 }

@@ -89,7 +89,8 @@ struct SceneOfLights {
         scene.add_spot(center, random.direction(), 1e-4f * emission, 0.3f, 0.6f);
       } else {
         const float size = 0.02f;
-        scene.add_triangle(center, center + size * random.direction(), center + size * random.direction(), emission, i % 7 == 0);
+        scene.add_triangle(center, center + size * random.direction(), center + size * random.direction(), emission,
+                           i % 7 == 0);
       }
     }
     return scene;
@@ -104,7 +105,8 @@ inline Color irradiance(const Emitters& emitters, const Vec3& p, const Vec3& n, 
   glm::dvec3 sum(0);
   for (int y = 0; y < grid; ++y) {
     for (int x = 0; x < grid; ++x) {
-      const Vec2 u((static_cast<float>(x) + random()) / static_cast<float>(grid), (static_cast<float>(y) + random()) / static_cast<float>(grid));
+      const Vec2 u((static_cast<float>(x) + random()) / static_cast<float>(grid),
+                   (static_cast<float>(y) + random()) / static_cast<float>(grid));
       const LightSample s = emitters.sample(receiver(p, n), n, random(), glm::min(u, Vec2(kOneMinusEpsilon)));
       if (s.pdf_w > 0) sum += glm::dvec3(s.radiance) * static_cast<double>(std::max(0.0f, glm::dot(n, s.wi)) / s.pdf_w);
     }

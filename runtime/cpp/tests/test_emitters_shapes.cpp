@@ -8,15 +8,7 @@ using namespace ln::test;
 
 namespace {
 
-AreaLight make_light(const Vec3& a, const Vec3& e1, const Vec3& e2, bool quad) {
-  AreaLight light;
-  light.a = a, light.e1 = e1, light.e2 = e2;
-  const DVec3 n = glm::cross(DVec3(e1), DVec3(e2));
-  light.n = Vec3(glm::normalize(n));
-  light.size = static_cast<float>(glm::length(n));
-  light.quad = quad;
-  return light;
-}
+AreaLight make_light(const Vec3& a, const Vec3& e1, const Vec3& e2, bool quad) { return {a, DVec3(e1), DVec3(e2), quad}; }
 
 double exact_solid_angle(const AreaLight& l, const Vec3& p) {
   const DVec3 a(l.a), b = a + DVec3(l.e1), c = a + DVec3(l.e2), d = b + DVec3(l.e2), q(p);
@@ -32,11 +24,14 @@ bool directions_are_uniform(const AreaLight& light, const Vec3& p, std::uint32_t
   const double whole = exact_solid_angle(light, p);
   // Cell (i, j, 0 or 1): the lower or upper half of a square of the grid over (s, t).
   std::vector<double> observed(2 * kCells * kCells), expected(2 * kCells * kCells);
-  const auto corner = [&](int i, int j) { return a + e1 * (static_cast<double>(i) / kCells) + e2 * (static_cast<double>(j) / kCells); };
+  const auto corner = [&](int i, int j) {
+    return a + e1 * (static_cast<double>(i) / kCells) + e2 * (static_cast<double>(j) / kCells);
+  };
   for (int j = 0; j < kCells; ++j) {
     for (int i = 0; i < kCells; ++i) {
       const std::size_t k = 2 * (static_cast<std::size_t>(j) * kCells + i);
-      if (light.quad || i + j < kCells) expected[k] = count / whole * triangle_solid_angle(corner(i, j), corner(i + 1, j), corner(i, j + 1), q);
+      if (light.quad || i + j < kCells)
+        expected[k] = count / whole * triangle_solid_angle(corner(i, j), corner(i + 1, j), corner(i, j + 1), q);
       if (light.quad || i + j < kCells - 1)
         expected[k + 1] = count / whole * triangle_solid_angle(corner(i + 1, j + 1), corner(i, j + 1), corner(i + 1, j), q);
     }
@@ -105,8 +100,8 @@ TEST_CASE("extreme random numbers and receivers give points on the light or noth
     AreaLight light = make_light(0.5f * random.cube(), size * random.direction(), size * random.direction(), i % 2 == 0);
     light.double_sided = true;
     if (!(light.size > 0)) continue;
-    Vec3 p = light.at(2 * random() - 0.5f, 2 * random() - 0.5f).p;       // in the plane but for rounding
-    if (i % 3 == 0) p = light.a;                                         // in a corner
+    Vec3 p = light.at(2 * random() - 0.5f, 2 * random() - 0.5f).p;  // in the plane but for rounding
+    if (i % 3 == 0) p = light.a;                                    // in a corner
     if (i % 3 == 1) p += std::pow(10.0f, -8 * random()) * random.direction();
     const float height = light.height(p);
     if (!light.seen_from(height)) continue;
@@ -121,7 +116,8 @@ TEST_CASE("extreme random numbers and receivers give points on the light or noth
 }
 
 TEST_CASE("spots fall off as the reference code of KHR_lights_punctual") {
-  for (const auto& [inner, outer] : {std::pair(0.2f, 0.7f), std::pair(0.0f, 0.785398f), std::pair(0.6f, 0.6001f), std::pair(0.01f, 0.03f)}) {
+  for (const auto& [inner, outer] :
+       {std::pair(0.2f, 0.7f), std::pair(0.0f, 0.785398f), std::pair(0.6f, 0.6001f), std::pair(0.01f, 0.03f)}) {
     const PunctualSource spot = PunctualSource::spot({}, {0, 0, -1}, Color(1), std::cos(inner), std::cos(outer));
     double sum = 0;
     float largest_error = 0;
@@ -150,7 +146,9 @@ TEST_CASE("spots fall off as the reference code of KHR_lights_punctual") {
     for (int i = 0; i < 40; ++i) {
       double cell = 0;
       for (int j = 0; j < 200; ++j)
-        cell += static_cast<double>(spot.attenuation(std::cos(outer) + range * (static_cast<float>(i) + (static_cast<float>(j) + 0.5f) / 200) / 40)) / 200;
+        cell += static_cast<double>(spot.attenuation(
+                    std::cos(outer) + range * (static_cast<float>(i) + (static_cast<float>(j) + 0.5f) / 200) / 40)) /
+                200;
       expected[static_cast<std::size_t>(i)] = kCount * cell * 2 * kPi * range / 40 / spot.effective_solid_angle();
     }
     CHECK(outside == 0);

@@ -37,8 +37,10 @@ class Distribution {
     std::size_t low = 0, high = size();
     while (high - low > 1) {
       const std::size_t middle = (low + high) / 2;
-      if (bounds_[middle] <= key) low = middle;
-      else high = middle;
+      if (bounds_[middle] <= key)
+        low = middle;
+      else
+        high = middle;
     }
     const auto width = static_cast<float>(bounds_[low + 1] - bounds_[low]);
     const float rest = (scaled - static_cast<float>(bounds_[low])) / width;

@@ -44,7 +44,7 @@ class Environment {
   Color mean_{0};
   std::vector<float> pixel_solid_angle_;  // by row
   Distribution rows_;
-  std::vector<Distribution> columns_;     // by row
+  std::vector<Distribution> columns_;  // by row
 };
 
 }  // namespace ln

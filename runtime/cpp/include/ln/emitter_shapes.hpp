@@ -9,18 +9,28 @@ namespace ln {
 /// A triangle or a parallelogram that emits. Corners: a, a + e1, (a + e1 + e2,) a + e2, counter-clockwise from the front.
 struct AreaLight {
   Vec3 a{0}, e1{0}, e2{0};
-  Vec3 n{0, 0, 1};                        // unit normal of the front
-  float size = 0;                         // |e1 x e2|: area of the parallelogram, twice that of the triangle
-  Color radiance{0};                      // [W/(m^2 sr)], mean if it varies
-  std::uint32_t triangle = kNoTriangle;   // the first of one or two
+  Vec3 n{0, 0, 1};                       // unit normal of the front
+  float size = 0;                        // |e1 x e2|: area of the parallelogram, twice that of the triangle
+  float error = 0;                       // of positions on it
+  Color radiance{0};                     // [W/(m^2 sr)], mean if it varies
+  std::uint32_t triangle = kNoTriangle;  // the first of one or two
   bool quad = false, double_sided = false, varies = false;
+
+  AreaLight() = default;
+  AreaLight(const Vec3& a, const DVec3& edge1, const DVec3& edge2, bool quad) : a(a), e1(edge1), e2(edge2), quad(quad) {
+    const DVec3 normal = glm::cross(edge1, edge2);
+    const double length = glm::length(normal);
+    // Below what float can express, it remains without size: no light.
+    if (!(length > 1e-37) || !std::isfinite(length)) return;
+    n = Vec3(normal / length);
+    size = static_cast<float>(length);
+    error = position_error(glm::abs(a) + glm::abs(e1) + glm::abs(e2));
+  }
 
   float area() const { return quad ? size : 0.5f * size; }
 
   /// Point a + s e1 + t e2.
-  SurfacePosition at(float s, float t) const {
-    return {a + s * e1 + t * e2, position_error(glm::abs(a) + glm::abs(e1) + glm::abs(e2)), n};
-  }
+  SurfacePosition at(float s, float t) const { return {a + s * e1 + t * e2, error, n}; }
 
   /// Height of `p` above the front; at most 0: the front cannot be seen from there.
   float height(const Vec3& p) const { return glm::dot(p - a, n); }
@@ -79,7 +89,7 @@ struct ViewedLight {
   T r01, r02, r12, r03, r13, r32;
   T first, second;  // half the solid angles of the triangles (0, 1, 3) and (0, 3, 2); of a triangle (0, 1, 2) and zero
 
-  ViewedLight(const AreaLight& light, const Vec3& p, float height) {
+  LN_INLINE ViewedLight(const AreaLight& light, const Vec3& p, float height) {
     using V = glm::vec<3, T>;
     determinant = std::abs(T(height)) * T(light.size);
     const V r0 = V(light.a) - V(p), r1 = r0 + V(light.e1), r2 = r0 + V(light.e2);
@@ -100,7 +110,7 @@ struct ViewedLight {
 
   /// The point that sweeps the share u.x of the solid angle around corner 0, from corner 1 to corner 2, and the share u.y
   /// from corner 0 outwards.
-  AreaSample sample(bool quad, const Vec2& u) const {
+  LN_INLINE AreaSample sample(bool quad, const Vec2& u) const {
     // The triangle (0, b, c) that is swept, and half the solid angle from b on.
     T lb = l1, lc = l2, r0b = r01, r0c = r02, rbc = r12, tau = T(u.x) * (first + second);
     const bool in_second = quad && tau >= first;
@@ -145,10 +155,14 @@ struct ViewedLight {
   }
 };
 
+LN_NOINLINE inline AreaSample sample_precisely(const AreaLight& light, const Vec3& p, float height, const Vec2& u) {
+  return ViewedLight<double>(light, p, height).sample(light.quad, u);
+}
+
 }  // namespace detail
 
 /// Solid angle of a light that is seen from `p`, which is `height` above it.
-inline float solid_angle(const AreaLight& light, const Vec3& p, float height) {
+LN_INLINE float solid_angle(const AreaLight& light, const Vec3& p, float height) {
   const detail::ViewedLight<float> view(light, p, height);
   return 2 * (view.first + view.second);
 }
@@ -157,13 +171,13 @@ inline float solid_angle(const AreaLight& light, const Vec3& p, float height) {
 /// Peters 2021, "BRDF Importance Sampling for Polygonal Lights", section 4, with barycentric coordinates read off the
 /// construction instead of found by intersection: it keeps its precision down to lights of any smallness, where it
 /// becomes uniform sampling of the area). The density is 1 / solid_angle() to the last bit.
-inline AreaSample sample_solid_angle(const AreaLight& light, const Vec3& p, float height, const Vec2& u) {
+LN_INLINE AreaSample sample_solid_angle(const AreaLight& light, const Vec3& p, float height, const Vec2& u) {
   const detail::ViewedLight<float> view(light, p, height);
   const float solid = 2 * (view.first + view.second);
   if (!(solid > 0)) return {};
   // Next to a light, the arcs are nearly half circles: their ends say too little about what is between them.
   constexpr float kLarge = 4;
-  AreaSample result = solid < kLarge ? view.sample(light.quad, u) : detail::ViewedLight<double>(light, p, height).sample(light.quad, u);
+  AreaSample result = solid < kLarge ? view.sample(light.quad, u) : detail::sample_precisely(light, p, height, u);
   result.pdf_w /= solid;
   return result;
 }
@@ -172,11 +186,12 @@ inline AreaSample sample_solid_angle(const AreaLight& light, const Vec3& p, floa
 struct PunctualSource {
   Vec3 position{0};
   Vec3 direction{0, 0, -1};
-  Color intensity{0};          // on the axis [W/sr, normalised units]
+  Color intensity{0};  // on the axis [W/sr, normalised units]
   float cos_outer = -1;
-  float scale = 0;             // 0: point light
+  float scale = 0;  // 0: point light
 
-  static PunctualSource spot(const Vec3& position, const Vec3& direction, const Color& intensity, float cos_inner, float cos_outer) {
+  static PunctualSource spot(const Vec3& position, const Vec3& direction, const Color& intensity, float cos_inner,
+                             float cos_outer) {
     return {position, direction, intensity, cos_outer, 1 / std::max(0.001f, cos_inner - cos_outer)};
   }
 

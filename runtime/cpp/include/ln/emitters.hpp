@@ -16,22 +16,22 @@ namespace ln {
 
 /// Light that may arrive at a point from one emitter.
 struct LightSample {
-  Vec3 wi{0, 0, 1};           // towards the emitter
-  Color radiance{0};          // area: radiance emitted towards the point; delta: irradiance on a surface facing it [per pdf_w = 1]
-  float pdf_w = 0;            // selection probability times solid-angle density; delta emitters: selection probability
-  bool delta = false;         // point, spot, directional: no BSDF sample can find it
-  float distance = kInfinity; // infinite: environment, directional
-  SurfacePosition position;   // on the emitter, if the distance is finite (ng = 0 for point lights)
+  Vec3 wi{0, 0, 1};    // towards the emitter
+  Color radiance{0};   // area: radiance emitted towards the point; delta: irradiance on a surface facing it [per pdf_w = 1]
+  float pdf_w = 0;     // selection probability times solid-angle density; delta emitters: selection probability
+  bool delta = false;  // point, spot, directional: no BSDF sample can find it
+  float distance = kInfinity;  // infinite: environment, directional
+  SurfacePosition position;    // on the emitter, if the distance is finite (ng = 0 for point lights)
 };
 
 /// A particle of light that leaves an emitter.
 struct PhotonEmission {
-  SurfacePosition position;   // spawn_ray(position, direction) is its way; ng = 0: not on a surface
+  SurfacePosition position;  // spawn_ray(position, direction) is its way; ng = 0: not on a surface
   Vec3 direction{0, 0, 1};
-  Color flux{0};              // power / probability [W / unit^2]: the mean over all particles is total_power(); black: skip it
-  float cos_theta = 1;        // of the direction to the emitter's normal; 1 where there is none
-  bool delta = false;         // from a point, spot or directional light
-  bool distant = false;       // from a directional light or the environment: it enters the scene from outside
+  Color flux{0};         // power / probability [W / unit^2]: the mean over all particles is total_power(); black: skip it
+  float cos_theta = 1;   // of the direction to the emitter's normal; 1 where there is none
+  bool delta = false;    // from a point, spot or directional light
+  bool distant = false;  // from a directional light or the environment: it enters the scene from outside
   std::uint32_t triangle = kNoTriangle;  // an emissive surface: where it starts
 };
 
@@ -123,9 +123,10 @@ class Emitters {
   void build_tree();
   void build_power();
 
-  std::size_t finite_count() const { return area_.size() + punctual_.size(); }
   Choice choose(const Vec3& p, const Vec3& n) const;
   float distant_importance(const DistantLight& light, const Vec3& n) const;
+  LightSample sample_several(const SurfacePosition& at, const Vec3& n, float u_pick, const Vec2& u) const;
+  LightSample sample_area(const SurfacePosition& at, const AreaLight& light, float pmf, const Vec2& u) const;
   LightSample sample_finite(const SurfacePosition& at, std::uint32_t index, float pmf, const Vec2& u) const;
   LightSample sample_distant(const Vec3& n, float u, float pmf, float total) const;
 
@@ -139,16 +140,17 @@ class Emitters {
   const SceneData* scene_;
   bool has_surfaces_ = false;
   std::size_t size_ = 0;
-  std::vector<Surface> surfaces_;                 // by part
-  std::vector<std::uint32_t> light_of_triangle_;  // of the emitting parts only; kNone: without power
-  std::vector<AreaLight> area_;                   // finite light i: area_[i], then punctual_
+  std::uint32_t area_count_ = 0, finite_count_ = 0;  // finite lights: surfaces, then points and spots
+  std::vector<Surface> surfaces_;                    // by part
+  std::vector<std::uint32_t> light_of_triangle_;     // of the emitting parts only; kNone: without power
+  std::vector<AreaLight> area_;                      // finite light i: area_[i], then punctual_
   std::vector<PunctualSource> punctual_;
   std::vector<DistantLight> distant_;
   std::unique_ptr<Environment> environment_;
-  LightBvh tree_;                                 // of the finite lights, where there is more than one
-  float distant_scale_ = 1;                       // makes irradiances comparable with the tree's importances
+  LightBvh tree_;            // of the finite lights, where there is more than one
+  float distant_scale_ = 1;  // makes irradiances comparable with the tree's importances
   float scene_radius_ = 1;
-  Distribution power_;                            // finite lights, distant lights, environment
+  Distribution power_;  // finite lights, distant lights, environment
   Color total_power_{0};
 };
 

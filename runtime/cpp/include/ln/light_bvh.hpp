@@ -11,10 +11,10 @@ namespace ln {
 /// What bounds the light that one or more finite emitters send out.
 struct LightBounds {
   Vec3 center{0};
-  float radius = 0;                 // all emitters are within this sphere
-  Vec3 axis{0, 0, 1};               // normals are within theta_o of it, light is within theta_e of a normal
+  float radius = 0;    // all emitters are within this sphere
+  Vec3 axis{0, 0, 1};  // normals are within theta_o of it, light is within theta_e of a normal
   float cos_o = 1, cos_e = 0;
-  double phi = 0;                   // sum of radiance * area, or intensity: irradiance * distance^2 facing it
+  double phi = 0;  // sum of radiance * area, or intensity: irradiance * distance^2 facing it
   bool two_sided = false;
 };
 
@@ -52,9 +52,9 @@ class LightBvh {
   using Float8 = float __attribute__((vector_size(kWidth * sizeof(float))));
 
   struct Node {
-    Float8 cx, cy, cz;            // centres
-    Float8 r, inv_r2;             // radii
-    Float8 ax, ay, az;            // axes
+    Float8 cx, cy, cz;  // centres
+    Float8 r, inv_r2;   // radii
+    Float8 ax, ay, az;  // axes
     Float8 cos_o, sin_o, cos_e;
     Float8 phi;                   // 0: no child
     Float8 two_sided;             // 1 or -1

@@ -159,7 +159,7 @@ Folder::~Folder() { close(descriptor_); }
 Bytes Folder::read_uri(std::string_view uri, MemoryBudget& memory) {
   const std::string_view scheme = uri_scheme(uri);
   const std::string path = percent_decode(uri);
-  if (!scheme.empty()) throw Error("only files beside the model are read, not \"" + printable(scheme, 20) + "\"");
+  if (!scheme.empty()) throw Error("only files beside the model are read, not " + quoted(scheme, 20));
   if (path.empty()) throw Error("the name of the file is empty");
   if (path.find('\0') != std::string::npos) throw Error("the name of the file holds a zero byte");
   if (path.front() == '/') throw Error("is an absolute path; only files in the model's folder are read");
@@ -205,7 +205,7 @@ Bytes decode_base64(std::string_view text, MemoryBudget& memory) {
   std::size_t out = 0;
   for (const char c : text) {
     const int value = kBase64Values[static_cast<unsigned char>(c)];
-    if (value < 0) throw Error("the base64 text holds the character \"" + printable({&c, 1}) + "\"");
+    if (value < 0) throw Error("the base64 text holds the character " + quoted({&c, 1}));
     bits = (bits << 6 | static_cast<std::uint32_t>(value)) & 0xffffff;
     held += 6;
     if (held >= 8) {
@@ -232,7 +232,7 @@ Bytes decode_data_uri(std::string_view uri, MemoryBudget& memory) {
     const std::size_t next = header.find(';', at + 1);
     const std::string_view parameter = header.substr(at + 1, next - at - 1);
     if (parameter.find('=') == std::string_view::npos)
-      throw Error("is not a data URI: \"" + printable(header, 60) + "\" has a parameter without '='");
+      throw Error("is not a data URI: " + quoted(header, 60) + " has a parameter without '='");
     at = next;
   }
   if (is_base64) return decode_base64(data, memory);

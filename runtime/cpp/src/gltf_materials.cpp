@@ -230,7 +230,7 @@ int MaterialReader::read_image(std::size_t index, bool srgb) {
     if (is_new) known->second = decode(bytes, srgb);
     return known->second;
   } catch (const Error& error) {
-    json.fail((is_file ? "\"" + printable(uri.text(), 120) + "\": " : "") + error.what());
+    json.fail((is_file ? quoted(uri.text(), 120) + ": " : "") + error.what());
   }
 }
 

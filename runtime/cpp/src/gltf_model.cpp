@@ -131,7 +131,7 @@ void Model::check_version() const {
     const bool has_point = major.ec == std::errc{} && major.ptr < text.data() + text.size() && *major.ptr == '.';
     const auto minor = has_point ? std::from_chars(major.ptr + 1, text.data() + text.size(), version.minor) : major;
     if (!has_point || minor.ec != std::errc{} || minor.ptr != text.data() + text.size())
-      json.fail("\"" + printable(text, 40) + "\" is not a version like \"2.0\"");
+      json.fail(quoted(text, 40) + " is not a version like \"2.0\"");
     return version;
   };
   const Json asset = root()["asset"];
@@ -173,7 +173,7 @@ Bytes Model::load_buffer(Json buffer, std::size_t index, const Glb& glb) {
     try {
       bytes = is_data_uri(uri.text()) ? decode_data_uri(uri.text(), memory) : folder.read_uri(uri.text(), memory);
     } catch (const Error& error) {
-      uri.fail((is_data_uri(uri.text()) ? "" : "\"" + printable(uri.text(), 120) + "\": ") + error.what());
+      uri.fail((is_data_uri(uri.text()) ? "" : quoted(uri.text(), 120) + ": ") + error.what());
     }
   }
   if (bytes.size < wanted)

@@ -278,7 +278,7 @@ class Checker {
       case Form::choice:
         want(value, JsonKind::string);
         if (!listed(rule.choices, value.text()))
-          value.fail("\"" + printable(value.text(), 60) + "\" is none of " + std::string(rule.choices));
+          value.fail(quoted(value.text(), 60) + " is none of " + std::string(rule.choices));
         return;
       case Form::code:
         check_integer(value, {0, kExact});

@@ -58,6 +58,13 @@ std::string printable(std::string_view text, std::size_t max_bytes) {
   return out;
 }
 
+std::string quoted(std::string_view text, std::size_t max_bytes) {
+  std::string out = "\"";
+  out += printable(text, max_bytes);
+  out += '"';
+  return out;
+}
+
 std::string number_text(double value) {
   constexpr double kPlain = 1e15;  // below, integers are written without exponent
   if (value == std::trunc(value) && std::abs(value) < kPlain) return std::to_string(static_cast<long long>(value));

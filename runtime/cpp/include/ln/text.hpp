@@ -11,6 +11,9 @@ namespace ln {
 /// escaped (`\n`, `\x1b`), and what goes beyond `max_bytes` is replaced by "...".
 std::string printable(std::string_view text, std::size_t max_bytes = 240);
 
+/// The same in quotation marks.
+std::string quoted(std::string_view text, std::size_t max_bytes = 240);
+
 /// The shortest decimal text that reads back as `value`.
 std::string number_text(double value);
 

@@ -254,3 +254,21 @@ TEST_CASE("continuous where roughness meets ideal specular") {
     }
   }
 }
+
+TEST_CASE("a table for a range of roughnesses agrees with those for single ones") {
+  float worst = 0;
+  for (const float ior : {1.1f, 1.5f, 2.4f}) {
+    const DielectricTable range(ior);
+    for (const float roughness : {0.0101f, 0.0234f, 0.05f, 0.15f, 0.26f, 0.4f, 0.63f, 0.85f, 1.0f}) {
+      const DielectricTable single(ior, roughness, roughness);
+      for (const bool outside : {true, false}) {
+        for (const float angle : kAngles) {
+          const float mu = at_angle(angle).z;
+          worst = std::max(worst, std::abs(range.deficit(outside, roughness, mu).y - single.deficit(outside, roughness, mu).y));
+        }
+      }
+    }
+  }
+  MESSAGE("worst difference of an albedo: " << worst);
+  CHECK(worst < 1.2e-3f);
+}

@@ -83,7 +83,7 @@ class PathTracing final : public NetworkRun {
           if (at.side_agrees(s.wi, local.z)) {
             const BsdfValue bsdf = at.bsdf().evaluate(at.wo_local, local);
             if (!is_black(bsdf.f_cos)) {
-              const Ray shadow = std::isfinite(s.distance) ? spawn_ray_to(from, s.position) : spawn_ray(from, s.wi);
+              const Ray shadow = s.distance < kInfinity ? spawn_ray_to(from, s.position) : spawn_ray(from, s.wi);
               if (!tracer.occluded(shadow, random.bits(vertex, kCoverage), kDirect)) {
                 const float weight = s.delta ? 1.0f : mis_weight(s.pdf_w, bsdf.pdf_w);
                 result += beta * bsdf.f_cos * s.radiance * (weight / s.pdf_w);

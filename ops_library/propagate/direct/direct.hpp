@@ -11,9 +11,8 @@ struct Direct {
 
   template <class Request>
   LN_INLINE Color answer(Request& request, const Emitters& light) const {
-    if (light.empty()) return Color(0);
     Color result(0);
-    if (request.takes_samples()) result += sample_emitters(request, light);
+    if (request.takes_samples() && !light.empty()) result += sample_emitters(request, light);
     if (light.has_area()) result += emission_on_bsdf_ray(request, light);
     return result;
   }

@@ -13,7 +13,7 @@ struct PathTracer {
 
   template <class Request, class In>
   LN_INLINE Color answer(Request& request, const In& in) const {
-    if (max_depth > 0 && request.depth() >= static_cast<std::uint64_t>(max_depth)) return Color(0);
+    if (request.depth() > static_cast<std::uint64_t>(max_depth - 1)) return Color(0);  // 0 wraps around: no bound
     const BsdfRay* ray = request.bsdf_ray(node);
     if (!ray || !ray->hit.found()) return Color(0);
     return arrive(request.tracer(), request.random(), *ray, request.beta(), request.depth(), in);
@@ -25,7 +25,7 @@ struct PathTracer {
   /// Asks for the light at the point that `ray` hit. The one function of a pull cycle that is not inlined.
   template <class In>
   LN_NOINLINE Color arrive(Tracer& tracer, const SampleStream& random, const BsdfRay& ray, const Color& beta, std::uint32_t depth,
-                           const In& in) const {
+                           In in) const {
     const Scene& scene = tracer.scene();
     const Interaction at(scene, ray.ray, ray.hit);
     if (from != kAnyTag && !(scene.part_tags(at.part) & from)) return Color(0);

@@ -61,7 +61,7 @@ class Request {
 
   /// Is the way to an emitter free?
   LN_INLINE bool visible(const LightSample& light, NodeId node) {
-    const Ray ray = std::isfinite(light.distance) ? spawn_ray_to(at_.at, light.position) : spawn_ray(at_.at, light.wi);
+    const Ray ray = light.distance < kInfinity ? spawn_ray_to(at_.at, light.position) : spawn_ray(at_.at, light.wi);
     return !tracer_.occluded(ray, random_.bits(depth_, kCoverage), node);
   }
 

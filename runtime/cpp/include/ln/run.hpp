@@ -93,7 +93,7 @@ class NetworkRun : public RunCallbacks {
 /// Radiance that arrives at the eye along `ray`: follows specular surfaces (S*), adds the emitters that are seen (L S* E)
 /// and asks the network at every surface on the way.
 template <class Network>
-Color eye_radiance(const Network& network, Tracer& tracer, Ray ray, const SampleStream& random) {
+LN_INLINE Color eye_radiance(const Network& network, Tracer& tracer, Ray ray, const SampleStream& random) {
   const Scene& scene = tracer.scene();
   Color result(0), beta(1);
   for (std::uint32_t depth = 0;; ++depth) {

@@ -22,6 +22,24 @@ class Related:
 
 
 @dataclass(frozen=True)
+class Hop:
+    """One step of a route: the wire (or result) that the light passes, and where the text says so."""
+
+    wire: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class Witness:
+    """A light path that proves a fault, counted exactly: `path` as text with adjacent letters, e.g. `LSD@floorE`."""
+
+    path: str
+    count: int
+    expected: int
+    routes: tuple[tuple[Hop, ...], ...]  # how the network carries it; each ends at the result
+
+
+@dataclass(frozen=True)
 class Diagnostic:
     """One message about one mistake; `code` has a page in `lnc.diagnostics.codes`."""
 
@@ -32,6 +50,7 @@ class Diagnostic:
     label: str = ""  # a few words under the carets
     related: tuple[Related, ...] = ()
     help: tuple[str, ...] = ()
+    witness: Witness | None = None
 
 
 @dataclass
@@ -50,11 +69,13 @@ class Reporter:
         label: str = "",
         related: Iterable[Related] = (),
         help: str | None = None,
+        witness: Witness | None = None,
+        severity: str = "error",
     ) -> None:
-        self._add(Diagnostic(code, "error", message, span, label, tuple(related), _tuple(help)))
+        self._add(Diagnostic(code, severity, message, span, label, tuple(related), _tuple(help), witness))
 
     def warning(self, code: str, span: Span, message: str, *, label: str = "", help: str | None = None) -> None:
-        self._add(Diagnostic(code, "warning", message, span, label, (), _tuple(help)))
+        self.error(code, span, message, label=label, help=help, severity="warning")
 
     def _add(self, diagnostic: Diagnostic) -> None:
         if len(self.diagnostics) < self.limit and diagnostic not in self.diagnostics:

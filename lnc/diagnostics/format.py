@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lnc.diagnostics import Diagnostic, Related
+from lnc.diagnostics import Diagnostic, Related, Witness
 from lnc.source import Span
 
 LINE_WIDTH = 140
@@ -76,8 +76,15 @@ def as_json(diagnostic: Diagnostic) -> dict[str, object]:
         "end_line": end_line,
         "end_column": end_column,
         "notes": notes,
-        "witness": None,
+        "witness": _witness(diagnostic.witness),
     }
+
+
+def _witness(witness: Witness | None) -> dict[str, object] | None:
+    if witness is None:
+        return None
+    routes = [[hop.wire for hop in route] for route in witness.routes]
+    return {"path": witness.path, "count": witness.count, "expected": witness.expected, "routes": routes}
 
 
 def _place(related: Related) -> str:

@@ -33,6 +33,9 @@ class Interaction {
  public:
   /// The surface that `ray` hit, seen from where the ray came from. `scene` must outlive it.
   Interaction(const Scene& scene, const Ray& ray, const Hit& hit);
+  /// The flat surface at `hit`, seen along its normal from the front or the back, with another BSDF: a receiver. Both
+  /// `scene` and `bsdf` must outlive it.
+  Interaction(const Scene& scene, const Hit& hit, bool front, const Bsdf& bsdf);
   Interaction(const Interaction&) = delete;
   Interaction& operator=(const Interaction&) = delete;
 
@@ -121,6 +124,13 @@ LN_INLINE Interaction::Interaction(const Scene& scene, const Ray& ray, const Hit
     scene.shade(*this, ray);
   }
   wo_local = frame.to_local(wo);
+}
+
+inline Interaction::Interaction(const Scene& scene, const Hit& on, bool seen_from_front, const Bsdf& bsdf)
+    : wo_local(0, 0, 1), hit(on), part(scene.data_.triangle_part[on.triangle]), front(seen_from_front), bsdf_(&bsdf) {
+  scene.locate(hit, at);
+  wo = front ? at.ng : -at.ng;
+  frame = make_frame(wo);
 }
 
 }  // namespace ln

@@ -71,18 +71,25 @@ def read_source(path: str) -> SourceFile:
 
 
 def write_text(path: str, text: str) -> None:
-    """Write a whole file or nothing: to a temporary name, then renamed. Raises Unreadable."""
+    """Write a whole file or nothing: to a temporary name, then renamed. Raises Unreadable.
+
+    What exists and is no regular file (a pipe, a terminal, `/dev/stdout`) cannot be replaced and is written into.
+    """
     target = Path(path)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    temporary: Path | None = None
     try:
-        if target.is_symlink():
-            target = target.resolve()
+        if target.exists() and not target.is_file():
+            target.write_text(text, "utf-8", newline="\n")
+            return
+        target = Path(os.path.realpath(target))  # a link stays one
+        temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
         temporary.write_text(text, "utf-8", newline="\n")
         if target.exists():
             temporary.chmod(target.stat().st_mode & 0o777)
         os.replace(temporary, target)
     except (OSError, ValueError) as error:
-        temporary.unlink(missing_ok=True)
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
         raise Unreadable(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from error
 
 

@@ -120,6 +120,24 @@ def test_graph(folder: Path) -> None:
     assert not (folder / "bad.svg").exists()
 
 
+def test_texts_are_written_into_what_is_no_file(folder: Path) -> None:
+    """A pipe keeps what it gets; a folder is refused, and a link to a file remains one."""
+    done = lnc("compile", "good.ln", "--emit-cpp", "/dev/stdout", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "int main(" in done.stdout
+    assert lnc("compile", "good.ln", "--emit-cpp", "/dev/null", cwd=folder).returncode == 0
+    refused = lnc("compile", "good.ln", "--emit-cpp", ".", cwd=folder)
+    assert refused.returncode == 2 and "cannot be written" in refused.stderr
+
+    (folder / "elsewhere").mkdir()
+    (folder / "elsewhere" / "real.cpp").write_text("old")
+    (folder / "link.cpp").symlink_to("elsewhere/real.cpp")
+    assert main(["compile", "good.ln", "--emit-cpp", "link.cpp"]) == 0
+    assert (folder / "link.cpp").is_symlink()
+    assert (folder / "elsewhere" / "real.cpp").read_text() == done.stdout
+    assert [p.name for p in (folder / "elsewhere").iterdir()] == ["real.cpp"]
+
+
 def test_ops(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["ops"]) == 0
     listed = capsys.readouterr().out

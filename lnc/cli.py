@@ -53,7 +53,7 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", help="report what is wrong in networks", allow_abbrev=False)
     check.add_argument("files", nargs="+", metavar="FILE")
-    check.add_argument("--format", choices=("human", "json"), default="human")
+    check.add_argument("--format", choices=("human", "json", "sarif", "github"), default="human")
     check.set_defaults(run=_check)
 
     explain = commands.add_parser(
@@ -143,16 +143,32 @@ def _check(arguments: argparse.Namespace) -> int:
             continue
         status = max(status, WRONG if result.failed else FINE)
         found += [d for d in result.diagnostics if d not in found]
-    if arguments.format == "json":
-        import json
-
-        from lnc.diagnostics.format import as_json
-
-        print(json.dumps([as_json(d) for d in found], indent=2))
-    else:
-        report(found)
-        _print_summary(found, len(arguments.files))
+    _print_found(found, arguments.format, len(arguments.files))
     return status
+
+
+def _print_found(found: list[Diagnostic], format: str, files: int) -> None:
+    """Diagnostics for people go to stderr, for programs to stdout."""
+    from lnc.diagnostics.format import as_github, as_json
+
+    match format:
+        case "json":
+            import json
+
+            print(json.dumps([as_json(d) for d in found], indent=2))
+        case "sarif":
+            import json
+
+            from lnc.diagnostics.sarif import as_sarif
+
+            print(json.dumps(as_sarif(found), indent=2))
+        case "github":
+            for diagnostic in found:
+                print(as_github(diagnostic))
+            _print_summary(found, files)
+        case _:
+            report(found)
+            _print_summary(found, files)
 
 
 def _print_summary(found: list[Diagnostic], files: int) -> None:

@@ -1,11 +1,12 @@
-"""Diagnostics as text for people, with source lines and carets, and as JSON for scripts."""
+"""Diagnostics as text for people, with source lines and carets; as JSON for scripts; as commands for GitHub Actions."""
 
 from __future__ import annotations
 
-from lnc.diagnostics import Diagnostic, Related, Witness
+from lnc.diagnostics import Diagnostic, Witness
 from lnc.source import Span
 
 LINE_WIDTH = 140
+HOP_LIMIT = 16  # hops of a route that are shown to people
 
 
 def printable(text: str) -> str:
@@ -27,6 +28,8 @@ def human(diagnostic: Diagnostic) -> str:
     for related in diagnostic.related:
         lines.append(f"note: {printable(related.message)}")
         lines += _snippet(related.span, "-", "")
+    if diagnostic.witness is not None:
+        lines += _witness_lines(diagnostic.witness)
     lines += [f"help: {printable(help)}" for help in diagnostic.help]
     return "\n".join(lines) + "\n"
 
@@ -59,13 +62,42 @@ def _tabless(text: str) -> str:
     return printable(text.replace("\t", "    "))
 
 
+# --- Witnesses --------------------------------------------------------------------------------------------------------
+
+
+def witness_headline(witness: Witness) -> str:
+    """`LSDE is counted 2 times instead of once`."""
+    return f"{witness.path} is counted {_times(witness.count)} instead of {_times(witness.expected)}"
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
+def _witness_lines(witness: Witness) -> list[str]:
+    """The path with its counts, and each route hop by hop: the place, the wire, and the line that makes it."""
+    lines = [printable(f"witness: {witness_headline(witness)}")]
+    for number, route in enumerate(witness.routes, 1):
+        lines.append(f"  route {number} of {len(witness.routes)}")
+        rows = [(str(hop.span), hop.wire, hop.span.source.line_text(hop.span.line).strip()) for hop in route]
+        if len(rows) > HOP_LIMIT:
+            left_out = ("...", f"{len(rows) - HOP_LIMIT} more", "")
+            rows = [*rows[: HOP_LIMIT // 2], left_out, *rows[-HOP_LIMIT // 2 :]]
+        place_width, wire_width = (max((len(printable(row[i])) for row in rows), default=0) for i in range(2))
+        for place, wire, text in rows:
+            shown = f"{printable(place):{place_width}}  {printable(wire):{wire_width}}  {_tabless(text[:LINE_WIDTH])}"
+            lines.append(f"    {shown}".rstrip())
+    return lines
+
+
+# --- For programs -----------------------------------------------------------------------------------------------------
+
+
 def as_json(diagnostic: Diagnostic) -> dict[str, object]:
     """A diagnostic as the contract describes it."""
     source = diagnostic.span.source
     line, column = source.line_column(diagnostic.span.start)
     end_line, end_column = source.line_column(diagnostic.span.end)
-    notes = [f"{_place(r)}: {r.message}" for r in diagnostic.related]
-    notes += [f"help: {help}" for help in diagnostic.help]
     return {
         "code": diagnostic.code,
         "severity": diagnostic.severity,
@@ -75,7 +107,7 @@ def as_json(diagnostic: Diagnostic) -> dict[str, object]:
         "column": column,
         "end_line": end_line,
         "end_column": end_column,
-        "notes": notes,
+        "notes": _notes(diagnostic),
         "witness": _witness(diagnostic.witness),
     }
 
@@ -87,5 +119,37 @@ def _witness(witness: Witness | None) -> dict[str, object] | None:
     return {"path": witness.path, "count": witness.count, "expected": witness.expected, "routes": routes}
 
 
-def _place(related: Related) -> str:
-    return str(related.span)
+def _notes(diagnostic: Diagnostic) -> list[str]:
+    related = [f"{r.span}: {r.message}" for r in diagnostic.related]
+    return related + [f"help: {help}" for help in diagnostic.help]
+
+
+def as_github(diagnostic: Diagnostic) -> str:
+    """A workflow command of GitHub Actions, which shows the diagnostic beside the line that it is about."""
+    source = diagnostic.span.source
+    line, column = source.line_column(diagnostic.span.start)
+    end_line, end_column = source.line_column(diagnostic.span.end)
+    properties = {
+        "file": source.name,
+        "line": line,
+        "col": column,
+        "endLine": end_line,
+        "endColumn": end_column,
+        "title": diagnostic.code,
+    }
+    listed = ",".join(f"{name}={_github_property(str(value))}" for name, value in properties.items())
+    text = [diagnostic.message, *_notes(diagnostic)]
+    if diagnostic.witness is not None:
+        text += _witness_lines(diagnostic.witness)
+    return f"::{diagnostic.severity} {listed}::{_github_text(chr(10).join(text))}"
+
+
+def _github_text(text: str) -> str:
+    """As the runner unescapes it; other control characters are made visible."""
+    for character, code in (("%", "%25"), ("\r", "%0D"), ("\n", "%0A")):
+        text = text.replace(character, code)
+    return printable(text)
+
+
+def _github_property(text: str) -> str:
+    return _github_text(text).replace(":", "%3A").replace(",", "%2C")

@@ -13,10 +13,8 @@ from lnc.network import Node, ScheduledNode, TypedNetwork
 
 
 def print_page(page: Page) -> str:
-    lines = [f"{page.code}: {page.title}", "", page.text]
-    if page.example:
-        lines += ["", "The smallest network that provokes it:", "", textwrap.indent(page.example.rstrip(), "    ")]
-    return "\n".join(lines) + "\n"
+    text = f"{page.code}: {page.title}\n\n{page.text}\n"
+    return f"{text}\n{page.provoked_by}" if page.example else text
 
 
 # --- A network --------------------------------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from lnc.diagnostics.format import as_github, human
 from lnc.diagnostics.sarif import as_sarif, file_uri
 from lnc.source import SourceFile, Span
 
+ROOT = Path(__file__).parent.parent
 TWICE = SourceFile(
     "networks/twice, 100%.ln",
     "light  = Lights()\ndirect = Direct(light)\nagain  = Direct(light)\nimage  direct + again\n",
@@ -59,8 +60,7 @@ def validator() -> jsonschema.Draft4Validator:
 # --- SARIF ------------------------------------------------------------------------------------------------------------
 
 
-def test_sarif_of_a_witness(validator: jsonschema.Draft4Validator, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(PAGES, "LN0301", PAGES["LN0102"])  # its text does not matter here
+def test_sarif_of_a_witness(validator: jsonschema.Draft4Validator) -> None:
     log = as_sarif([counted_twice()])
     validator.validate(log)
     (run,) = log["runs"]  # type: ignore[misc]
@@ -99,7 +99,7 @@ def test_sarif_of_every_kind_of_fault(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    codes = [code for code, page in PAGES.items() if page.example]
+    codes = [code for code, page in PAGES.items() if page.example and not page.operators]
     for code in codes:
         (tmp_path / f"{code}.ln").write_text(PAGES[code].example or "")
     (tmp_path / "tabs and ümlauts.ln").write_text("\tlight = Lights(é = 1)\n\timage Direct(light\n", "utf-8")
@@ -118,7 +118,7 @@ def test_sarif_of_every_kind_of_fault(
 
 def test_sarif_of_nothing(validator: jsonschema.Draft4Validator, capsys: pytest.CaptureFixture[str]) -> None:
     """A log without results is how a code host learns that what it showed before is gone."""
-    assert main(["check", "--format", "sarif", "examples/direct.ln"]) == 0
+    assert main(["check", "--format", "sarif", str(ROOT / "examples" / "direct.ln")]) == 0
     log = json.loads(capsys.readouterr().out)
     validator.validate(log)
     assert log["runs"][0]["results"] == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from textwrap import indent
 
 
 @dataclass(frozen=True)
@@ -13,6 +14,20 @@ class Page:
     title: str
     text: str
     example: str | None
+    operators: tuple[str, ...] = ()  # declarations beyond the built-in library that the example needs
+    scene: str | None = None  # the glTF file (JSON) that the example is checked with
+
+    @property
+    def provoked_by(self) -> str:
+        """The example with what it needs, as text under headings; "" without an example."""
+        if self.example is None:
+            return ""
+        parts = [("The smallest network that provokes it:", self.example)]
+        if self.operators:
+            parts.append(("with these operators in a folder given by --ops:", "\n".join(self.operators)))
+        if self.scene is not None:
+            parts.append(("with this glTF file given by --scene:", self.scene))
+        return "\n".join(f"{heading}\n\n{indent(text, '    ')}" for heading, text in parts)
 
 
 def page(code: str) -> Page | None:
@@ -127,8 +142,50 @@ whose quality is a choice, never is.""",
         "LN0202",
         "ambiguous conversion",
         """Several chains of converters cost the same. There is no silent choice: write the one that you want
-as a call.""",
-        None,
+as a call. The built-in converters are never ambiguous by themselves.""",
+        "light = Lights()\nimage ParticleTracer(light)\n",
+        operators=(
+            "operator Smooth(in: Photons) -> Points {\n    paths irradiance = in\n    converter cost 3\n}\n",
+            "operator Sharp(in: Photons) -> Points {\n    paths irradiance = in\n    converter cost 3\n}\n",
+        ),
+    ),
+    Page(
+        "LN0301",
+        "path counted too often",
+        """The picture is to hold every light path once, or as often as `expect` says. The path in the message
+is the shortest one that is counted more often, so its light would be too bright. Two routes through
+the network carry it; the message lists both, wire by wire, with their lines. Leave one of the wires
+out of the sum, or narrow one of them by via, from or to.""",
+        "light   = Lights()\ndirect  = Direct(light)\ndirect2 = Direct(light)\n"
+        "expect  L S* E | L (D|G) S* E\nimage   direct + direct2\n",
+    ),
+    Page(
+        "LN0302",
+        "path missing",
+        """The picture lacks light: no route through the network carries the path in the message, which is the
+shortest of its kind. It is an error where `expect` asks for the path. Without `expect` the picture
+is compared with all light, L(D|G|S)*E, and what is missing is a warning; a network that is partial
+on purpose says so: `expect` with the paths that it has, or `expect <= PATH`, which allows less.
+L@delta S* E carries no light and is never missed.""",
+        "light  = Lights()\ndirect = Direct(light)\nexpect L (D|G|S)* E\nimage  direct\n",
+    ),
+    Page(
+        "LN0303",
+        "path counted negatively",
+        """A difference takes away light that was never there: the path in the message is carried by what is
+subtracted, but not by what it is subtracted from, so its light is negative in the picture. Narrow
+the wire behind the minus to paths that the other one has.""",
+        "light  = Lights()\ndirect = Direct(light)\nbounce = PathTracer(direct)\n"
+        "expect L S* E | L (D|G) S* E\nimage  direct - bounce\n",
+    ),
+    Page(
+        "LN0304",
+        "operator that can never carry light",
+        """No light path fits what the operator follows, whatever the scene holds, so its wire is always dark.
+Mostly its input is restricted to surfaces (by to, from or via) on which the operator allows no
+event. Remove the operator, or widen one of the restrictions.""",
+        'tag mirror = material "Mirror*"\nlight  = Lights()\nnear   = Direct(light, to = mirror)\n'
+        "bounce = PathTracer(near, via = D@!mirror)\nexpect <= L (D|G|S)* E\nimage  near + bounce\n",
     ),
     Page(
         "LN0305",
@@ -145,7 +202,9 @@ choice: D and G, for S asks for one exact direction. Radiance can be scattered b
         """An operator that works before the picture
 needs its own result. The message prints the loop hop by hop. Break it: a pulled cycle (PathTracer)
 is allowed, one through an operator that must be complete first is not.""",
-        None,
+        "light   = Lights()\nphotons = Retrace(Direct(light) + density)\n"
+        "density = NNDensity(photons)\nimage   density\n",
+        operators=("operator Retrace(in: Points) -> Photons {\n    paths samples = in D\n}\n",),
     ),
     Page(
         "LN0402",

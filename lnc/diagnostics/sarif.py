@@ -33,12 +33,11 @@ def as_sarif(diagnostics: Sequence[Diagnostic]) -> Json:
 def _rule(code: str) -> Json:
     page = PAGES[code]
     text = " ".join(page.text.split())
-    example = f"\n\nThe smallest network that provokes it:\n\n{page.example}" if page.example else ""
     return {
         "id": code,
         "shortDescription": {"text": page.title},
         "fullDescription": {"text": text},
-        "help": {"text": text + example},
+        "help": {"text": f"{text}\n\n{page.provoked_by}".strip()},
     }
 
 

@@ -133,6 +133,13 @@ def describe_paths(typed: TypedNetwork) -> PathReport:
     return light_paths(typed.network, typed.alphabet)
 
 
+def describe_seen(typed: TypedNetwork) -> dict[str, str]:
+    """The light paths that the eye sees of each wire with a picture of its own."""
+    from lnc.passes.light_paths import seen_paths
+
+    return seen_paths(typed.network, typed.alphabet)
+
+
 def compile_file(path: str, ops: tuple[str, ...] = (), dump: Dump | None = None) -> Result:
     """Read and compile a network. Raises Unreadable; faults in the library come first among the diagnostics."""
     source = read_source(path)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from lnc.build import BuildError, BuildOptions, build_program, program_path
 from lnc.cli import FINE, USAGE, WRONG, fail, report
-from lnc.driver import STAGES, Result, Unreadable, compile_file, describe_paths, write_text
+from lnc.driver import STAGES, Result, Unreadable, compile_file, describe_paths, describe_seen, write_text
 from lnc.locations import library_folders
 from lnc.network import PathValue
 
@@ -67,9 +67,8 @@ def write_cpp(result: Result) -> str:
 
     assert result.schedule is not None and result.typed is not None
     paths = describe_paths(result.typed)
-    wires = {wire: " | ".join(expression for _, expression in contents) for wire, contents in paths.wires.items()}
     source = result.file.span.source.text
-    return write_program(program_view(result.schedule, source, paths.image or "", wires))
+    return write_program(program_view(result.schedule, source, paths.image or "", describe_seen(result.typed)))
 
 
 def _read(arguments: argparse.Namespace) -> tuple[Result | None, int]:

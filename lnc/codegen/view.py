@@ -15,9 +15,9 @@ POINTS = "Points"
 
 @dataclass(frozen=True)
 class TermView:
-    """A wire in a sum: `factor * pull(request)`; an empty factor is 1."""
+    """A wire in a sum: `factor * value`, with a pull or a variable as its value; an empty factor is 1."""
 
-    pull: str
+    value: str
     factor: str
 
 
@@ -76,21 +76,21 @@ class NodeView:
 
 
 @dataclass(frozen=True)
-class ResultView:
-    """One value that the picture is made of: evaluated once, counted in the sum or not, shown in layers."""
+class SeenView:
+    """A wire that the eye sees: a variable for what is pulled once (`pull`), or for a sum of other such variables."""
 
+    variable: str
+    pull: str
     terms: tuple[TermView, ...]
-    counted: bool
-    layers: tuple[int, ...]
-    text: str
 
 
 @dataclass(frozen=True)
 class LayerView:
-    """A wire shown beside the picture; with `file`, as a picture of its own."""
+    """A picture of some wires, as a layer or, with `file`, on its own. Without `terms`: others fill it."""
 
     name: str
     light_paths: str
+    terms: tuple[TermView, ...] = ()
     file: str = ""
 
 
@@ -110,36 +110,42 @@ class ProgramView:
     headers: tuple[str, ...]
     nodes: tuple[NodeView, ...]
     prepare: tuple[NodeView, ...]
-    results: tuple[ResultView, ...]
+    seen: tuple[SeenView, ...]
+    picture: tuple[TermView, ...]
     layers: tuple[LayerView, ...]
+    emitters_layer: int  # the layer of the emitters that are seen; -1: there is none
+    subtracts: bool
     slots: tuple[SlotView, ...]
     tags: tuple[TagRuleView, ...]
     image_paths: str
 
 
-def program_view(schedule: Schedule, source: str, image_paths: str, wire_paths: dict[str, str]) -> ProgramView:
+def program_view(schedule: Schedule, source: str, image_paths: str, seen_paths: dict[str, str]) -> ProgramView:
     """The view of a network.
 
-    `source`: its text. `image_paths`: the picture's light paths; `wire_paths`: what the eye sees of each wire.
+    `source`: its text. `image_paths`: the picture's light paths; `seen_paths`: those of each wire that has a picture of
+    its own, as the eye sees it.
     """
-    return _Builder(schedule, wire_paths).build(source, image_paths)
+    return _Builder(schedule, seen_paths).build(source, image_paths)
 
 
 class _Builder:
-    def __init__(self, schedule: Schedule, wire_paths: dict[str, str]) -> None:
+    def __init__(self, schedule: Schedule, seen_paths: dict[str, str]) -> None:
         self.schedule = schedule
-        self.wire_paths = wire_paths
+        self.seen_paths = seen_paths
         wires = [n.identifier for n in schedule.nodes]
         self.members = unique_names(wires)
         self.pulls = unique_names(wires, "pull_", self.members.values())
         self.constants = unique_names(wires, "k_", [*self.members.values(), *self.pulls.values()])
+        self.variables = unique_names(wires, "seen_", [*self.members.values(), *self.pulls.values()])
         self.by_name = {n.name: n for n in schedule.nodes}
         self.tag_bits = {tag.name: i for i, tag in enumerate(schedule.tags)}
         self.layers: list[LayerView] = []
 
     def build(self, source: str, image_paths: str) -> ProgramView:
         nodes = {n.name: self.node(n) for n in self.schedule.nodes}
-        results = self.results()
+        image = self.schedule.image
+        emitters_layer = self.result_layers()
         file = PurePath(self.schedule.file).name
         return ProgramView(
             network=self.schedule.network,
@@ -148,8 +154,11 @@ class _Builder:
             headers=tuple(sorted({_header(n) for n in self.schedule.nodes})),
             nodes=tuple(nodes.values()),
             prepare=tuple(nodes[name] for name in self.schedule.prepare),
-            results=results,
+            seen=self.seen(),
+            picture=self.seen_terms(image.terms) if image else (),
             layers=tuple(self.layers),
+            emitters_layer=emitters_layer,
+            subtracts=any(t.weight < 0 for terms in self.all_terms() for t in terms),
             slots=tuple(slot for n in self.schedule.nodes for slot in self.slots(n)),
             tags=tuple(
                 TagRuleView(i, tag.name, kind, glob)
@@ -191,7 +200,7 @@ class _Builder:
         if kind == "tags":
             return "ln::kAnyTag" if value is None else self.tag_set(str(value))
         if kind == "text" and p.name == "layer":
-            return str(self.layer(str(value), n.name))
+            return str(self.layer(str(value), self.seen_paths.get(n.name, "")))
         if kind == "text":
             return cpp_string(str(value))
         if kind == "choice":
@@ -205,9 +214,9 @@ class _Builder:
     def tag_set(self, tag: str) -> str:
         return f"ln::TagSet{{1}} << {self.tag_bits[tag]}"
 
-    def layer(self, name: str, wire: str) -> int:
+    def layer(self, name: str, light_paths: str, terms: tuple[TermView, ...] = ()) -> int:
         """Number of the layer called `name`, a new one."""
-        self.layers.append(LayerView(name, self.wire_paths.get(wire, "")))
+        self.layers.append(LayerView(name, light_paths, terms))
         return len(self.layers) - 1
 
     def table(self, n: ScheduledNode, p: ParameterValue) -> TableView:
@@ -236,31 +245,64 @@ class _Builder:
 
     def terms(self, terms: tuple[Term, ...]) -> tuple[TermView, ...]:
         return tuple(
-            TermView(self.pulls[self.by_name[t.node].identifier], "" if t.weight == 1 else float_literal(t.weight))
-            for t in terms
+            TermView(f"{self.pulls[self.by_name[t.node].identifier]}(request)", _factor(t.weight)) for t in terms
         )
 
-    def results(self) -> tuple[ResultView, ...]:
-        """What is evaluated at a surface that the eye sees: the picture's terms, then taps that are not among them."""
+    # --- What the eye sees --------------------------------------------------------------------------------------------
+
+    def result_layers(self) -> int:
+        """Adds the layers of `image ... layers` and of taps. Returns the number of the emitters' layer, or -1.
+
+        Of a wire that is subtracted, the layer holds what is taken away.
+        """
         image = self.schedule.image
-        terms = list(image.terms) if image else []
-        shown: dict[int, list[int]] = {i: [] for i in range(len(terms))}
-        extra: list[ResultView] = []
+        emitters = -1
         if image and image.layers:
-            for i, term in enumerate(terms):
-                shown[i].append(self.layer(term.node, term.node))
+            weights = _merged(image.terms)
+            for wire, weight in weights.items():
+                term = TermView(self.variables[self.by_name[wire].identifier], _factor(abs(weight)))
+                self.layer(wire, _weighted(weight, self.seen_paths[wire]), (term,))
+            name = "emitters"
+            while any(name == layer.name for layer in self.layers):
+                name += "_"
+            emitters = self.layer(name, "L S* E")
         for tap in self.schedule.taps:
-            single = tap.terms[0] if len(tap.terms) == 1 else None
-            paths = " | ".join(self.wire_paths.get(t.node, "") for t in tap.terms)
-            self.layers.append(LayerView(Path(tap.file).stem, paths, tap.file))
-            number = len(self.layers) - 1
-            same = [i for i, t in enumerate(terms) if single and (t.node, t.weight) == (single.node, single.weight)]
-            if same:
-                shown[same[0]].append(number)
-            else:
-                extra.append(ResultView(self.terms(tap.terms), False, (number,), tap.file))
-        counted = [ResultView(self.terms((t,)), True, tuple(shown[i]), t.node) for i, t in enumerate(terms)]
-        return (*counted, *extra)
+            paths = " + ".join(_weighted(w, self.seen_paths[wire]) for wire, w in _merged(tap.terms).items())
+            paths = paths.replace("+ -", "- ")
+            self.layers.append(LayerView(Path(tap.file).stem, paths, self.seen_terms(tap.terms), tap.file))
+        return emitters
+
+    def seen(self) -> tuple[SeenView, ...]:
+        """The wires that results are made of, each once. A sum is made of its terms, which results may show, too."""
+        results = [self.schedule.image.terms] if self.schedule.image else []
+        results += [tap.terms for tap in self.schedule.taps]
+        found: dict[str, SeenView] = {}
+        stack = [wire for terms in reversed(results) for wire in reversed(_merged(terms))]
+        while stack:
+            n = self.by_name[stack[-1]]
+            terms = _merged(n.inputs[0].terms) if n.op.name == "Sum" and n.receivers is None else {}
+            missing = [wire for wire in terms if wire not in found]
+            if missing and n.name not in found:
+                stack += reversed(missing)
+                continue
+            stack.pop()
+            if n.name not in found:
+                summed = self.seen_terms(n.inputs[0].terms) if terms else ()
+                pull = "" if terms else self.pulls[n.identifier]
+                found[n.name] = SeenView(self.variables[n.identifier], pull, summed)
+        return tuple(found.values())
+
+    def seen_terms(self, terms: tuple[Term, ...]) -> tuple[TermView, ...]:
+        """A sum of wires that the eye sees."""
+        return tuple(
+            TermView(self.variables[self.by_name[wire].identifier], _factor(weight))
+            for wire, weight in _merged(terms).items()
+        )
+
+    def all_terms(self) -> list[tuple[Term, ...]]:
+        """Every sum of the network."""
+        sums = [i.terms for n in self.schedule.nodes for i in n.inputs] + [tap.terms for tap in self.schedule.taps]
+        return sums + ([self.schedule.image.terms] if self.schedule.image else [])
 
     def slots(self, n: ScheduledNode) -> list[SlotView]:
         found = []
@@ -283,6 +325,23 @@ class _Builder:
                 )
             )
         return found
+
+
+def _merged(terms: tuple[Term, ...]) -> dict[str, float]:
+    """Each wire of a sum with its whole weight, in the order of the text; without those that cancel out."""
+    weights: dict[str, float] = {}
+    for term in terms:
+        weights[term.node] = weights.get(term.node, 0) + term.weight
+    return {wire: weight for wire, weight in weights.items() if weight != 0}
+
+
+def _factor(weight: float) -> str:
+    return "" if weight == 1 else float_literal(weight)
+
+
+def _weighted(weight: float, light_paths: str) -> str:
+    """`L D E`, `-(L D E)`, `2 (L D E)`."""
+    return light_paths if weight == 1 else f"{'-' if weight == -1 else f'{weight:g} '}({light_paths})"
 
 
 def _bound(value: float | None, sign: str) -> str:

@@ -36,8 +36,20 @@ def light_paths(network: Network, alphabet: Alphabet) -> PathReport:
     image = None
     if network.image is not None:
         # L@delta S* E carries no light, so the simpler of both is as true.
-        image = min(_render(automaton.image(network.image.terms, seen), renderer) for seen in (None, "area"))[1]
+        image = min(_render(automaton.image(network.image.terms, emitters), renderer) for emitters in (None, "area"))[1]
     return PathReport(wires, image)
+
+
+def seen_paths(network: Network, alphabet: Alphabet) -> dict[str, str]:
+    """What the eye sees of each wire that has a picture of its own (a term of `image ... layers` or of a `tap`, or a
+    `WireTap`): its paths, closed as the picture closes them, without the emitters that are seen."""
+    automaton = _NetworkAutomaton(network, alphabet)
+    renderer = Renderer(alphabet)
+    terms = [t for tap in network.taps for t in tap.terms]
+    if network.image is not None and network.image.layers:
+        terms += network.image.terms
+    shown = {t.node for t in terms} | {n.name for n in network.nodes if n.op.name == "WireTap"}
+    return {name: _render(automaton.seen({name}), renderer)[1] for name in sorted(shown)}
 
 
 def _render(nfa: Nfa, renderer: Renderer) -> tuple[int, str]:
@@ -174,15 +186,20 @@ class _NetworkAutomaton:
                 nfa.accepting.add(state)
         return nfa
 
-    def image(self, terms: tuple[Term, ...], seen: str | None) -> Nfa:
-        """L S* E, and what arrives, scattered once as its content allows, then S* E."""
+    def image(self, terms: tuple[Term, ...], emitters: str | None) -> Nfa:
+        """The picture of some wires: what is seen of them, and L S* E, the emitters that are seen."""
+        nfa = self.seen({term.node for term in terms})
+        specular = len(nfa.edges) - 2
+        nfa.edges[0] = [*nfa.edges[0], (self.alphabet.emitters(emitters), specular)]
+        return nfa
+
+    def seen(self, wires: set[str]) -> Nfa:
+        """What arrives on the wires, scattered once as its content allows, then S* E (the last two states)."""
         nfa = Nfa(list(self.nfa.edges), list(self.nfa.silent), set())
         specular, end = nfa.state(), nfa.state()
         nfa.accepting = {end}
-        nfa.edges[0] = [*nfa.edges[0], (self.alphabet.emitters(seen), specular)]
         nfa.edge(specular, self.alphabet.events("S"), specular)
         nfa.edge(specular, self.alphabet.eye, end)
-        wires = {term.node for term in terms}
         for (wire, content, letters), state in self.index.items():
             if wire in wires and content != "emission":
                 events = "".join(e for e in SCATTERED[content] if e != "S")

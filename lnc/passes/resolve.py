@@ -93,6 +93,7 @@ class _Resolver:
         if image is None and not taps and not self.reporter.failed:
             start = self.file.statements[0].span if self.file.statements else self.file.span
             self.reporter.error("LN0109", start, "the network has no result", help="add: image WIRE")
+        self._check_layers(image, taps)
         self._report_unused()
         return Network(
             name=names[0].name if names else name,
@@ -432,6 +433,25 @@ class _Resolver:
         for name in sorted(tags_in(path) - set(self.tags) - self.broken):
             help = did_you_mean(name, self.tags)
             self.reporter.error("LN0102", path.span, f"no tag is called {quote(name)}", help=help)
+
+    def _check_layers(self, image: Image | None, taps: list[Tap]) -> None:
+        """No two layers of the picture, and no two taps, may have one name."""
+        layers: dict[str, Span] = {}
+        if image is not None and image.layers:
+            layers = {term.node: term.span for term in image.terms}
+        for node in self.nodes:
+            value = node.parameter("layer")
+            if value is None or not isinstance(value.value, str) or value.given is None:
+                continue
+            if value.value in layers:
+                message = f"the picture has a layer {quote(value.value)} already"
+                self._twice(value.given.span, message, layers[value.value])
+            layers.setdefault(value.value, value.given.span)
+        files: dict[str, Span] = {}
+        for tap in taps:
+            if tap.file in files:
+                self._twice(tap.span, f"a tap writes the file {quote(tap.file)} already", files[tap.file])
+            files.setdefault(tap.file, tap.span)
 
     def _twice(self, span: Span, message: str, first: Span, code: str = "LN0106") -> None:
         self.reporter.error(code, span, message, related=[Related(first, "first here")])

@@ -32,7 +32,8 @@ std::uint64_t Film::bytes_needed(int width, int height, int layer_count) {
          (sizeof(Pixel) + sizeof(Sum) * static_cast<std::uint64_t>(layer_count));
 }
 
-Film::Film(int width, int height, int layer_count) : width_(width), height_(height), layer_count_(layer_count) {
+Film::Film(int width, int height, int layer_count, Samples samples)
+    : width_(width), height_(height), layer_count_(layer_count), samples_(samples) {
   check_memory(width, height, layer_count);
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   pixels_.resize(pixels);
@@ -45,7 +46,7 @@ void Film::accumulate_repaired(double (&sum)[3], const Color& c) {
     const auto bits = std::bit_cast<std::uint32_t>(c[i]);
     if ((bits & 0x7fffffffu) >= 0x7f800000u) {
       non_finite = true;
-    } else if (bits > 0x80000000u) {
+    } else if (bits > 0x80000000u && samples_ == Samples::positive) {
       negative = true;
     } else {
       sum[i] += static_cast<double>(c[i]);  // -0 is 0
@@ -92,7 +93,7 @@ ErrorEstimate Film::estimate_error() const {
     double error = 0;
     for (std::size_t i = 0; i < 3; ++i) {
       const double a = pixel.sum[0][i] / n_a, b = pixel.sum[1][i] / n_b;
-      error += (a - b) * (a - b) * weight / (a * b + 0.01);
+      error += (a - b) * (a - b) * weight / (std::max(a * b, 0.0) + 0.01);
     }
     error *= 1.0 / 3;
     sum += error;

@@ -144,7 +144,8 @@ int render_program(const Options& options, const ProgramInfo& program, RunCallba
   stats.seconds.build = watch.seconds();
   throw_if_interrupted();
 
-  Film film(size.width, size.height, static_cast<int>(program.layers.size()));
+  Film film(size.width, size.height, static_cast<int>(program.layers.size()),
+            program.subtracts ? Film::Samples::signed_values : Film::Samples::positive);
   progress.phase("prepare");
   watch = Stopwatch();
   callbacks.prepare(context);

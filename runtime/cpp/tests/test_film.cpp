@@ -104,6 +104,18 @@ TEST_CASE("values that no picture may hold are repaired and counted") {
   CHECK(film.mean(0, 0, 0) == Color(0));
 }
 
+TEST_CASE("samples of differences keep their sign, means do not") {
+  Film film(2, 1, 0, Film::Samples::signed_values);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    film.add(0, 0, i, Color(i % 2 == 0 ? 3.0f : -1.0f));
+    film.add(1, 0, i, Color(i % 2 == 0 ? 1.0f : -3.0f));
+  }
+  CHECK(film.mean(0, 0) == Color(1));
+  CHECK(film.mean(1, 0) == Color(0));
+  CHECK(film.negative_samples() == 0);
+  CHECK(std::isfinite(film.estimate_error().rel_mse));
+}
+
 TEST_CASE("radiances from 1e-38 to the largest float keep their digits") {
   for (const float value : {1e-38f, 1e-30f, 1e-6f, 1.0f, 1e30f, std::numeric_limits<float>::max()}) {
     Film film(1, 1);

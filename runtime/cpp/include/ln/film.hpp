@@ -32,8 +32,11 @@ struct ErrorEstimate {
 
 class Film {
  public:
+  /// Values that single samples may have. `signed_values`: of differences, whose mean alone has to be positive.
+  enum class Samples : std::uint8_t { positive, signed_values };
+
   /// Throws Error if the machine has too little memory for it.
-  Film(int width, int height, int layer_count = 0);
+  Film(int width, int height, int layer_count = 0, Samples samples = Samples::positive);
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -41,7 +44,7 @@ class Film {
   static std::uint64_t bytes_needed(int width, int height, int layer_count);
 
   /// Adds a sample of the picture. Row 0 is the top. A value that no picture may hold is repaired (not a number, infinite: 0;
-  /// negative: 0) and counted.
+  /// negative where samples are to be positive: 0) and counted.
   void add(int x, int y, std::uint32_t sample, const Color& radiance) {
     const std::size_t index = pixel_index(x, y);
     const unsigned half = film_half(sample);
@@ -103,6 +106,7 @@ class Film {
   void accumulate_repaired(double (&sum)[3], const Color& c);
 
   int width_, height_, layer_count_;
+  Samples samples_;
   std::vector<Pixel> pixels_;
   std::vector<Sum> layers_;  // layer by layer
   std::atomic<std::uint64_t> non_finite_{0}, negative_{0};

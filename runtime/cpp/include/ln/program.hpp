@@ -62,6 +62,7 @@ struct ProgramInfo {
   std::span<const ParameterSlot> parameters = {};
   std::span<const NodeInfo> nodes = {};
   std::span<const LayerInfo> layers = {};
+  bool subtracts = false;  // some wire is subtracted, so samples may be negative
 };
 
 /// What the parts of a run share.

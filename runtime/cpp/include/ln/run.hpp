@@ -4,6 +4,7 @@
 // A Network is a struct with
 //   void prepare(PrepareStep& step)              work before the picture: step(node id, [&](PrepareContext&) { ... }) each
 //   Color image(Request&) const                  what the eye gets from a surface point; a template
+//   static constexpr int emitters_layer          the layer that shows the emitters that are seen; -1: none does
 //   std::span<const ParameterSlot> parameters()  and the other tables of ProgramInfo
 
 #include <atomic>
@@ -96,15 +97,19 @@ template <class Network>
 LN_INLINE Color eye_radiance(const Network& network, Tracer& tracer, Ray ray, const SampleStream& random) {
   const Scene& scene = tracer.scene();
   Color result(0), beta(1);
+  const auto add_emitter = [&](const Color& light) {
+    result += light;
+    if constexpr (Network::emitters_layer >= 0) tracer.layers()[Network::emitters_layer] += light;
+  };
   for (std::uint32_t depth = 0;; ++depth) {
     const Hit hit = tracer.intersect(ray, random.bits(depth, kCoverage + 1), kEye, RayKind::camera);
     if (!hit.found()) {
-      result += beta * scene.emitters().environment(ray.direction);
+      add_emitter(beta * scene.emitters().environment(ray.direction));
       return result;
     }
     const Interaction at(scene, ray, hit);
     beta *= at.transmittance;
-    result += beta * scene.emitters().radiance(hit, at.wo);
+    add_emitter(beta * scene.emitters().radiance(hit, at.wo));
 
     Request<Events::DG, Events::all> request(tracer, random, at, beta, depth + 1, RayKind::camera);
     if (any(at.bsdf().events() & Events::DG)) result += beta * network.image(request);

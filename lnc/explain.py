@@ -119,6 +119,8 @@ def describe_operator(op: Operator) -> str:
     lines.append(f"bias: {f'up to {op.bias:.3g} of the mean' if op.bias else 'none'}")
     if op.prepares:
         lines.append("works before the picture")
+    if op.overloads:
+        lines.append(f"{op.overloads}({', '.join(p.representation for p in op.ports)}) stands for it, too")
     if op.converter:
         lines.append(
             f"inserted where needed, cost {op.converter.cost:g}"

@@ -93,6 +93,7 @@ class Operator:
     converter: Converter | None
     recursion: str | None  # "roulette" or "depth": bounds a pull recursion through it
     prepares: bool  # works before the picture: its C++ has a `prepare` function
+    overloads: str | None  # another operator, whose name stands for this one where the inputs are of this one's kind
     span: Span = field(compare=False, repr=False)
 
     @property
@@ -121,6 +122,15 @@ class Library:
         for op in sorted(self.operators.values(), key=lambda o: o.name):
             if op.converter is not None:
                 found.setdefault(op.ports[0].representation, []).append(op)
+        return {name: tuple(ops) for name, ops in found.items()}
+
+    @cached_property
+    def overloads(self) -> dict[str, tuple[Operator, ...]]:
+        """Operators that a name stands for beside the one that it belongs to, sorted by name."""
+        found: dict[str, list[Operator]] = {}
+        for op in sorted(self.operators.values(), key=lambda o: o.name):
+            if op.overloads is not None:
+                found.setdefault(op.overloads, []).append(op)
         return {name: tuple(ops) for name, ops in found.items()}
 
 

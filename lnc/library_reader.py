@@ -66,7 +66,25 @@ def read_library(texts: dict[str, str]) -> tuple[Library, list[Diagnostic]]:
     operators: dict[str, Operator] = {}
     for place, declaration in declared:
         operators[declaration.name] = _OperatorReader(declaration, place, representations, reporter).read()
+    for _, declaration in declared:
+        _check_overload(declaration, operators, reporter)
     return Library(operators, representations), reporter.sorted()
+
+
+def _check_overload(declaration: ast.OperatorDeclaration, operators: dict[str, Operator], reporter: Reporter) -> None:
+    """One name gives one representation, whatever the inputs: so a call's output is known before its inputs are."""
+    item = next((i for i in declaration.body if isinstance(i, ast.OverloadsDeclaration)), None)
+    if item is None:
+        return
+    named, op = operators.get(item.name), operators[declaration.name]
+    if named is None:
+        reporter.error("LN0112", item.span, f"'{op.name}' overloads '{item.name}', which no file declares")
+    elif named.overloads is not None:
+        reporter.error("LN0112", item.span, f"'{named.name}' overloads '{named.overloads}': overload that instead")
+    elif named.output != op.output or [p.name for p in named.ports] != [p.name for p in op.ports]:
+        wanted = f"({', '.join(p.name for p in named.ports)}) -> {named.output}"
+        message = f"'{op.name}' overloads '{named.name}', but its inputs and output are not named alike: {wanted}"
+        reporter.error("LN0112", item.span, message)
 
 
 class _OperatorReader:
@@ -97,6 +115,7 @@ class _OperatorReader:
         parameters = tuple(self._parameter(i) for i in body if isinstance(i, ast.ParameterDeclaration))
         converter = next((i for i in body if isinstance(i, ast.ConverterDeclaration)), None)
         recursion = next((i for i in body if isinstance(i, ast.RecursionDeclaration)), None)
+        overloads = next((i for i in body if isinstance(i, ast.OverloadsDeclaration)), None)
         if recursion is not None and recursion.kind not in ("roulette", "depth"):
             self._error(recursion.span, "a recursion is bounded by 'roulette' or by 'depth'")
         if converter is not None and len(ports) != 1:
@@ -119,6 +138,7 @@ class _OperatorReader:
             converter=Converter(self._number(converter.cost, "number"), converter.loss) if converter else None,
             recursion=recursion.kind if recursion else None,
             prepares=any(p.complete for p in ports) or any(isinstance(i, ast.PrepareDeclaration) for i in body),
+            overloads=overloads.name if overloads else None,
             span=declaration.name_span,
         )
 

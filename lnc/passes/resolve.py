@@ -11,6 +11,7 @@ Representations are left to typecheck and insert_converters.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from lnc.conversions import cheapest_chains
@@ -228,7 +229,7 @@ class _Resolver:
     # --- Calls --------------------------------------------------------------------------------------------------------
 
     def _call(self, call: ast.Call, name: str, origin: str, home: _Home, annotation: str | None = None) -> None:
-        op = self.library.operators.get(call.op)
+        op = self._operator(call)
         if op is None:
             self._unknown_operator(call)
             for wire in call.inputs:  # look for further mistakes
@@ -238,6 +239,28 @@ class _Resolver:
         parameters = self._parameters(call, op)
         if inputs is not None and parameters is not None:
             self._add(name, op, inputs, parameters, origin, home, call.span, annotation)
+
+    def _operator(self, call: ast.Call) -> Operator | None:
+        """The operator that a name stands for: of its overloads the one whose inputs take the least conversion."""
+        op = self.library.operators.get(call.op)
+        if op is None or call.op not in self.library.overloads:
+            return op
+        candidates = (op, *self.library.overloads[call.op])
+        return min(candidates, key=lambda candidate: self._conversion_cost(call, candidate))
+
+    def _conversion_cost(self, call: ast.Call, op: Operator) -> float:
+        """Cost of the converters that the inputs of a call need; infinite where one cannot be converted."""
+        given: dict[str, ast.WireExpression] = {p.name: w for p, w in zip(op.ports, call.inputs, strict=False)}
+        for argument in call.arguments:
+            if isinstance(argument.value, ast.NameValue):
+                given.setdefault(argument.name, ast.WireName(argument.value.name, argument.value.span))
+        total = 0.0
+        for port in op.ports:
+            found = self._representation(given[port.name]) if port.name in given else None
+            if found is not None:
+                chains = cheapest_chains(self.library, found, port.representation)
+                total += sum(o.converter.cost for o in chains[0] if o.converter) if chains else math.inf
+        return total
 
     def _unknown_operator(self, call: ast.Call) -> None:
         if call.op in self.broken or self.reporter.full:

@@ -329,6 +329,12 @@ class PrepareDeclaration(Record):
     span: Span
 
 
+class OverloadsDeclaration(Record):
+    name: str
+    comments: Comments
+    span: Span
+
+
 OperatorItem = (
     ParameterDeclaration
     | PathsDeclaration
@@ -336,6 +342,7 @@ OperatorItem = (
     | ConverterDeclaration
     | RecursionDeclaration
     | PrepareDeclaration
+    | OverloadsDeclaration
 )
 
 

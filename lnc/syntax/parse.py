@@ -28,7 +28,7 @@ STATEMENT_WORDS = (
     "operator",
     "representation",
 )
-ITEM_WORDS = ("paths", "bias", "converter", "recursion", "prepare")
+ITEM_WORDS = ("paths", "bias", "converter", "recursion", "prepare", "overloads")
 
 
 def parse(source: SourceFile, reporter: Reporter) -> File:

@@ -151,6 +151,8 @@ def _item(item: ast.Statement | ast.OperatorItem) -> tuple[str, str, str, tuple[
             return "recursion", kind, "", ()
         case ast.PrepareDeclaration():
             return "prepare", "", "", ()
+        case ast.OverloadsDeclaration(name):
+            return "overloads", name, "", ()
     raise AssertionError(item)
 
 

@@ -80,23 +80,34 @@ class Request {
   LN_INLINE const BsdfRay* sample() {
     if (!sampled_) {
       sampled_ = true;
-      BsdfSample s;
-      const Bsdf& bsdf = at_.bsdf();
-      const float u_lobe = bsdf.single_lobe() ? 0 : random_.get1(depth_, kBsdfLobe);
-      valid_ = bsdf.sample(at_.wo_local, u_lobe, random_.get2(depth_, kBsdfDirection), kSamples, Carried::radiance, s);
-      if (valid_) {
-        const Vec3 wi = at_.frame.to_world(s.wi);
-        valid_ = at_.side_agrees(wi, s.wi.z);
-        sample_.ray = spawn_ray(at_.at, wi);
-        sample_.weight = s.weight;
-        sample_.pdf_w = s.pdf_w;
-        sample_.event = s.event;
-      }
+      valid_ = draw<kSamples>(random_, sample_);
     }
     return valid_ ? &sample_ : nullptr;
   }
 
+  /// Another sample, of what the receiver scatters, drawn with the numbers of `random` and traced at the cost of `node`.
+  /// False: nothing is scattered.
+  bool trace_sample(const SampleStream& random, NodeId node, BsdfRay& sample) {
+    if (!draw<kReceives>(random, sample)) return false;
+    sample.hit = tracer_.intersect(sample.ray, random.bits(depth_, kCoverage + 1), node, RayKind::gather);
+    return true;
+  }
+
  private:
+  template <Events kFrom>
+  LN_INLINE bool draw(const SampleStream& random, BsdfRay& sample) const {
+    BsdfSample s;
+    const Bsdf& bsdf = at_.bsdf();
+    const float u_lobe = bsdf.single_lobe() ? 0 : random.get1(depth_, kBsdfLobe);
+    if (!bsdf.sample(at_.wo_local, u_lobe, random.get2(depth_, kBsdfDirection), kFrom, Carried::radiance, s)) return false;
+    const Vec3 wi = at_.frame.to_world(s.wi);
+    sample.ray = spawn_ray(at_.at, wi);
+    sample.weight = s.weight;
+    sample.pdf_w = s.pdf_w;
+    sample.event = s.event;
+    return at_.side_agrees(wi, s.wi.z);
+  }
+
   Tracer& tracer_;
   const SampleStream& random_;
   const Interaction& at_;

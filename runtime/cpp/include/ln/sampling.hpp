@@ -134,6 +134,10 @@ class SampleStream {
     return key_ + (vertex * kPerVertex + own) * 0x9e3779b9u + index_ * 0x85ebca6bu;
   }
 
+  /// The stream of branch `j` of the `n` that a path splits into at `vertex`: branches are as well distributed among each other
+  /// as samples are.
+  SampleStream branch(std::uint32_t vertex, std::uint32_t j, std::uint32_t n) const { return {hash32(key_, vertex), index_ * n + j}; }
+
   std::uint32_t index() const { return index_; }
 
  private:

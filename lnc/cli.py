@@ -13,6 +13,7 @@ import lnc
 if TYPE_CHECKING:
     from lnc.diagnostics import Diagnostic
     from lnc.driver import Result
+    from lnc.scene_tags import SceneNames
 
 FINE, WRONG, USAGE = 0, 1, 2
 
@@ -54,6 +55,7 @@ def _parser() -> argparse.ArgumentParser:
     check = commands.add_parser("check", help="report what is wrong in networks", allow_abbrev=False)
     check.add_argument("files", nargs="+", metavar="FILE")
     check.add_argument("--format", choices=("human", "json", "sarif", "github"), default="human")
+    check.add_argument("--scene", metavar="SCENE", help="a glTF file: are there tags that match nothing in it?")
     check.set_defaults(run=_check)
 
     explain = commands.add_parser(
@@ -129,11 +131,19 @@ def compile_or_report(path: str, ops: list[str]) -> tuple[Result | None, int]:
 
 
 def _check(arguments: argparse.Namespace) -> int:
-    from lnc.diagnostics import unreadable
+    from lnc.diagnostics import Reporter, unreadable
     from lnc.driver import Unreadable, compile_file
 
     status = FINE
     found: list[Diagnostic] = []
+    names: SceneNames | None = None
+    if arguments.scene is not None:
+        from lnc.scene_tags import UnreadableScene, check_tags, read_scene_names
+
+        try:
+            names = read_scene_names(arguments.scene)
+        except UnreadableScene as error:
+            return fail(str(error))
     for path in arguments.files:
         try:
             result = compile_file(path, tuple(arguments.ops))
@@ -141,8 +151,11 @@ def _check(arguments: argparse.Namespace) -> int:
             status = USAGE
             found.append(unreadable(path, str(error)))
             continue
-        status = max(status, WRONG if result.failed else FINE)
-        found += [d for d in result.diagnostics if d not in found]
+        reporter = Reporter(list(result.diagnostics))
+        if names is not None:
+            check_tags(result.file, names, arguments.scene, reporter)
+        status = max(status, WRONG if reporter.failed else FINE)
+        found += [d for d in reporter.sorted() if d not in found]
     _print_found(found, arguments.format, len(arguments.files))
     return status
 

@@ -214,6 +214,23 @@ sums and scales alone add no event and would never end.""",
         "light  = Lights()\ndirect = Direct(light)\nloop   = Scale(direct + loop, factor = 0.5)\nimage  loop\n",
     ),
     Page(
+        "LN0501",
+        "tag matches nothing in the scene",
+        """`lnc check --scene FILE` compares tags with a glTF file. This one matches nothing that its scene shows
+or that gives light there, so what from, to and via select by it is empty. Globs are compared with whole
+names and tell upper and lower case apart: * is any text, ? any byte, [a-z] one of several. A tag without
+a glob is looked for in extras.tags of materials, meshes, nodes and lights.""",
+        'tag mirror = material "Miror*"\nlight = Lights()\nexpect <= L (D|G|S)* E\nimage Direct(light, to = mirror)\n',
+        scene="""{
+    "asset": {"version": "2.0"},
+    "nodes": [{"mesh": 0}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+    "accessors": [{"componentType": 5126, "type": "VEC3", "count": 3}],
+    "materials": [{"name": "Mirror"}]
+}
+""",
+    ),
+    Page(
         "LN0502",
         "too many tags",
         """Every combination of the tags that from, to and via name is told apart. Six tags make 64

@@ -37,13 +37,19 @@ std::string list_json(const List& list, Item item) {
   return out + (list.empty() ? "]" : "\n ]");
 }
 
+std::string tags_json(const std::vector<std::string>& tags) {
+  std::string out = "[";
+  for (const std::string& tag : tags) out += (out == "[" ? "" : ", ") + quoted(tag);
+  return out + "]";
+}
+
 std::string material_json(const ln::Material& m) {
-  return "{\"name\": " + quoted(m.name) + ", \"base_color\": " + vector_json(m.base_color) +
-         ", \"alpha\": " + number_text(m.alpha) + ", \"metallic\": " + number_text(m.metallic) +
-         ", \"roughness\": " + number_text(m.roughness) + ", \"emission\": " + vector_json(m.emission) +
-         ", \"transmission\": " + number_text(m.transmission) + ", \"ior\": " + number_text(m.ior) +
-         ", \"solid\": " + (m.solid ? "true" : "false") + ", \"unlit\": " + (m.unlit ? "true" : "false") +
-         ", \"double_sided\": " + (m.double_sided ? "true" : "false") +
+  return "{\"name\": " + quoted(m.name) + ", \"tags\": " + tags_json(m.tags) +
+         ", \"base_color\": " + vector_json(m.base_color) + ", \"alpha\": " + number_text(m.alpha) +
+         ", \"metallic\": " + number_text(m.metallic) + ", \"roughness\": " + number_text(m.roughness) +
+         ", \"emission\": " + vector_json(m.emission) + ", \"transmission\": " + number_text(m.transmission) +
+         ", \"ior\": " + number_text(m.ior) + ", \"solid\": " + (m.solid ? "true" : "false") +
+         ", \"unlit\": " + (m.unlit ? "true" : "false") + ", \"double_sided\": " + (m.double_sided ? "true" : "false") +
          ", \"alpha_mode\": " + std::to_string(static_cast<int>(m.alpha_mode)) +
          ", \"textured\": " + (m.has_texture() ? "true" : "false") + "}";
 }
@@ -57,9 +63,9 @@ std::string camera_json(const ln::Camera& c) {
 
 std::string light_json(const ln::PunctualLight& l) {
   constexpr const char* kKinds[] = {"point", "spot", "directional"};
-  return "{\"name\": " + quoted(l.name) + ", \"kind\": \"" + kKinds[static_cast<int>(l.kind)] +
-         "\", \"position\": " + vector_json(l.position) + ", \"direction\": " + vector_json(l.direction) +
-         ", \"intensity\": " + vector_json(l.intensity) + "}";
+  return "{\"name\": " + quoted(l.name) + ", \"node\": " + quoted(l.node) + ", \"tags\": " + tags_json(l.tags) +
+         ", \"kind\": \"" + kKinds[static_cast<int>(l.kind)] + "\", \"position\": " + vector_json(l.position) +
+         ", \"direction\": " + vector_json(l.direction) + ", \"intensity\": " + vector_json(l.intensity) + "}";
 }
 
 std::string image_json(const ln::Image& i) {
@@ -69,8 +75,8 @@ std::string image_json(const ln::Image& i) {
 }
 
 std::string part_json(const ln::Part& p) {
-  return "{\"mesh\": " + quoted(p.mesh) + ", \"node\": " + quoted(p.node) + ", \"material\": " + std::to_string(p.material) +
-         ", \"triangles\": " + std::to_string(p.triangle_count) + "}";
+  return "{\"mesh\": " + quoted(p.mesh) + ", \"node\": " + quoted(p.node) + ", \"tags\": " + tags_json(p.tags) +
+         ", \"material\": " + std::to_string(p.material) + ", \"triangles\": " + std::to_string(p.triangle_count) + "}";
 }
 
 /// Sums over all triangles that different encodings of one mesh must agree on: area and, by the divergence theorem, volume.

@@ -1,0 +1,54 @@
+"""PointsToQuadTree: known functions (in C++), and agreement with what it samples on a lit plane."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+SCENES = Path(__file__).resolve().parents[3] / "examples" / "scenes"
+
+exr = pytest.importorskip("benchmarks.exr")
+
+CELLS = """
+light  = Lights()
+direct = Direct(light)
+cells  = direct as QuadTree
+image cells
+"""
+
+
+def picture(run_program, program, *options, scene="plane_area.gltf"):
+    run = run_program(program, SCENES / scene, "--size", "40x30", "--samples", "64", *options)
+    assert run.status == 0, run.stderr
+    return exr.read(run.picture)
+
+
+def test_known_answers(runtime_tool):
+    done = subprocess.run([runtime_tool("test_quad_tree")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_picture_is_that_of_the_samples(compiled_network, run_program):
+    cells = picture(run_program, compiled_network("cells", text=CELLS))
+    direct = picture(run_program, compiled_network("direct"))
+    assert cells.mean() == pytest.approx(direct.mean(), rel=0.01)
+    assert abs(cells - direct).mean() < 0.03 * direct.mean()
+
+
+def test_the_seed_decides_not_the_threads(compiled_network, run_program):
+    program = compiled_network("cells", text=CELLS)
+    pictures = [picture(run_program, program, "--samples", "1", "--threads", str(n)) for n in (1, 3)]
+    assert (pictures[0] == pictures[1]).all()
+    assert (pictures[0] != picture(run_program, program, "--samples", "1", "--seed", "1")).any()
+
+
+def test_fewer_cells_for_a_larger_error(compiled_network, run_program):
+    program = compiled_network("cells", text=CELLS)
+    direct = picture(run_program, compiled_network("direct"))
+    options = ("--set", "cells.cell=2m", "--set", "cells.samples=64")
+    errors = [
+        abs(picture(run_program, program, *options, "--set", f"cells.error={e}") - direct).mean() / direct.mean()
+        for e in (0.01, 0.3)
+    ]
+    assert errors[0] < 0.02
+    assert 0.05 < errors[1] < 0.3

@@ -1,0 +1,21 @@
+#pragma once
+
+#include "ln/operator.hpp"
+#include "ln/quad_tree.hpp"
+
+namespace ln::ops {
+
+/// Look-up of cells; see quad_tree_to_points.ln.
+struct QuadTreeToPoints {
+  NodeId node;
+
+  template <class Request>
+  Color answer(Request& request, const QuadTree& tree) const {
+    if constexpr (!any(Request::receives & Events::D)) return Color(0);
+    const Interaction& at = request.at();
+    if (!any(at.bsdf().events() & Events::D)) return Color(0);
+    return request.scatter_irradiance(tree.irradiance(at.hit.triangle, at.hit.u, at.hit.v, at.front));
+  }
+};
+
+}  // namespace ln::ops

@@ -1,0 +1,17 @@
+#pragma once
+// What radiosity sees of a surface: how much of the irradiance its diffuse lobe returns.
+
+#include "ln/scene.hpp"
+
+namespace ln {
+
+/// Can this side of a part scatter diffusely anywhere?
+bool scatters_diffusely(const Scene& scene, std::uint32_t part, bool front);
+
+/// Does what `diffuse_albedo` says vary over the part?
+bool albedo_varies(const Scene& scene, std::uint32_t part);
+
+/// Radiant exitance over irradiance of the diffuse lobe at a point, averaged over directions of view, times the coverage there.
+Color diffuse_albedo(const Scene& scene, const Hit& hit, bool front);
+
+}  // namespace ln

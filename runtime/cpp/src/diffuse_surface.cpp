@@ -1,0 +1,53 @@
+#include "ln/diffuse_surface.hpp"
+
+#include "ln/material.hpp"
+
+namespace ln {
+
+namespace {
+
+/// Calls `use(bsdf)` for one side of the surface at a hit, as it is seen along the normal.
+template <class Use>
+auto with_bsdf(const Scene& scene, const Hit& hit, bool front, Use&& use) {
+  SurfacePosition at;
+  scene.locate(hit, at);
+  const Vec3 outwards = front ? at.ng : -at.ng;
+  const Interaction interaction(scene, Ray{at.p + outwards, -outwards, kInfinity}, hit);
+  return use(interaction.bsdf());
+}
+
+Hit middle_of(std::uint32_t triangle) { return {0, triangle, 1.0f / 3, 1.0f / 3}; }
+
+}  // namespace
+
+bool scatters_diffusely(const Scene& scene, std::uint32_t part, bool front) {
+  const SceneData& data = scene.data();
+  const Part& p = data.parts[part];
+  if (p.triangle_count == 0 || data.materials[p.material].unlit) return false;
+  if (albedo_varies(scene, part)) return true;
+  return with_bsdf(scene, middle_of(p.first_triangle), front, [](const Bsdf& bsdf) { return any(bsdf.events() & Events::D); });
+}
+
+bool albedo_varies(const Scene& scene, std::uint32_t part) {
+  const SceneData& data = scene.data();
+  const Part& p = data.parts[part];
+  return data.materials[p.material].has_texture() || p.has_colors;
+}
+
+Color diffuse_albedo(const Scene& scene, const Hit& hit, bool front) {
+  const Color albedo = with_bsdf(scene, hit, front, [](const Bsdf& bsdf) {
+    if (!any(bsdf.events() & Events::D)) return Color(0);
+    if (bsdf.single_lobe()) return bsdf.diffuse_reflectance(Vec3(0, 0, 1));
+    // Integral of R(mu) 2 mu dmu = integral of R(sqrt(x)) dx, by Gauss and Legendre.
+    constexpr float kNode[4] = {0.0694318442f, 0.3300094782f, 0.6699905218f, 0.9305681558f};
+    constexpr float kWeight[4] = {0.1739274226f, 0.3260725774f, 0.3260725774f, 0.1739274226f};
+    Color sum(0);
+    for (int i = 0; i < 4; ++i)
+      sum += kWeight[i] * bsdf.diffuse_reflectance(Vec3(std::sqrt(1 - kNode[i]), 0, std::sqrt(kNode[i])));
+    return sum;
+  });
+  const SceneData& data = scene.data();
+  return hit.triangle < data.alpha_begin ? albedo : albedo * coverage(data, hit.triangle, hit.u, hit.v);
+}
+
+}  // namespace ln

@@ -12,7 +12,6 @@ from lnc.build import BuildError, BuildOptions, build_program, program_path
 from lnc.cli import FINE, USAGE, WRONG, fail, report
 from lnc.driver import STAGES, Result, Unreadable, compile_file, describe_paths, describe_seen, write_text
 from lnc.locations import library_folders
-from lnc.network import PathValue
 
 
 def compile_command(arguments: argparse.Namespace) -> int:
@@ -86,13 +85,6 @@ def _read(arguments: argparse.Namespace) -> tuple[Result | None, int]:
     report(result.diagnostics)
     if result.failed or result.schedule is None:
         return result, WRONG
-    for node in result.schedule.nodes:
-        for parameter in node.parameters:
-            if isinstance(parameter.value, PathValue) and parameter.value.events.tags:
-                where = f"{node.file}:{node.line}: {node.name}.{parameter.name} = {parameter.value.text}"
-                return result, fail(
-                    f"{where}: programs cannot tell tags in a path parameter apart yet; use from and to"
-                )
     return result, FINE
 
 

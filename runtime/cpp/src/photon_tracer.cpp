@@ -161,14 +161,13 @@ class ParticleChunk {
   /// Samples one of the events that lead on. Returns the state that it leads to, or -1: the path ends here. Smooth lobes
   /// overlap, so events that lead to different states are told apart by choosing between them first.
   int scatter(const Interaction& at, const SampleStream& random, std::uint32_t dimension, int state, BsdfSample& sample) const {
-    std::uint32_t tag_bits = 0;
-    for (int t = 0; t < via_.tag_count; ++t) tag_bits |= static_cast<std::uint32_t>(scene_.part_tags(at.part) >> via_.tags[t] & 1u) << t;
+    const std::uint32_t tags = tag_mask(scene_.part_tags(at.part), via_.tags, via_.tag_count);
 
     EventGroup groups[kEventCount];
     int group_count = 0;
     for (int e = 0; e < kEventCount; ++e) {
       if (!any(at.bsdf().events() & kLetters[e])) continue;
-      const int next = via_.after(state, e, tag_bits);
+      const int next = via_.after(state, e, tags);
       if (next < 0 || !live_[next]) continue;
       int g = 0;
       while (g < group_count && groups[g].state != next) ++g;

@@ -13,6 +13,7 @@
 // all ports that are marked `complete` (and those pulled) ready to be read.
 
 #include <memory>
+#include <utility>
 
 #include "ln/prepare.hpp"
 #include "ln/request.hpp"
@@ -26,17 +27,42 @@ bool reaches(Request& request, TagSet to) {
   return to == kAnyTag || (request.tracer().scene().part_tags(request.at().part) & to);
 }
 
-/// A path expression of one event, as the set of events that it allows. `Via` is a generated automaton:
-/// next[state][event] with events in the order D, G, S and -1 for "no path", accepting[state].
+/// A path expression of one event: the events that it allows on a surface. `Via` is a generated automaton:
+/// next[state][event << tag_count | tags] with events in the order D, G, S and -1 for "no path", accepting[state]. Bit i of
+/// `tags` is set where the surface has the tag Via::tags[i].
 template <class Via>
-constexpr Events single_step(Via) {
+constexpr Events single_step(Via, std::uint32_t tags = 0) {
   Events events = Events::none;
   constexpr Events kLetters[] = {Events::D, Events::G, Events::S};
-  for (int e = 0; e < 3; ++e) {
-    const int next = Via::next[0][e];
+  for (std::uint32_t e = 0; e < 3; ++e) {
+    const int next = Via::next[0][e << Via::tag_count | tags];
     if (next >= 0 && Via::accepting[next]) events = events | kLetters[e];
   }
   return events;
+}
+
+/// Calls `work.operator()<events>()` with the events that `Via`, an expression of one event, allows on the part: there is
+/// code for each set of events that occurs, and where there are no tags, no choice. Nothing allowed: the answer is black.
+template <class Via, class Work>
+LN_INLINE Color with_step(Via via, const Scene& scene, std::uint32_t part, Work&& work) {
+  if constexpr (Via::tag_count == 0) {
+    return work.template operator()<single_step(Via{})>();
+  } else {
+    const Events allowed = single_step(via, tag_mask(scene.part_tags(part), Via::tags, Via::tag_count));
+    constexpr auto occurs = [](Events events) {
+      for (std::uint32_t tags = 0; tags < 1u << Via::tag_count; ++tags)
+        if (single_step(Via{}, tags) == events) return true;
+      return false;
+    };
+    Color answer(0);
+    const auto try_set = [&]<std::size_t kBits>() {
+      constexpr auto kEvents = static_cast<Events>(kBits);
+      if constexpr (any(kEvents) && occurs(kEvents))
+        if (allowed == kEvents) answer = work.template operator()<kEvents>();
+    };
+    [&]<std::size_t... kBits>(std::index_sequence<kBits...>) { (try_set.template operator()<kBits>(), ...); }(std::make_index_sequence<8>{});
+    return answer;
+  }
 }
 
 }  // namespace ln

@@ -17,6 +17,13 @@ namespace ln {
 using TagSet = std::uint64_t;
 inline constexpr TagSet kAnyTag = ~TagSet{0};
 
+/// The tags with the given numbers among `tags`: bit i is set if numbers[i] is.
+inline std::uint32_t tag_mask(TagSet tags, const int* numbers, int count) {
+  std::uint32_t mask = 0;
+  for (int i = 0; i < count; ++i) mask |= static_cast<std::uint32_t>(tags >> numbers[i] & 1u) << i;
+  return mask;
+}
+
 /// One `tag name = kind "glob" | ...` of a network.
 struct TagRule {
   enum class Kind : std::uint8_t { material, mesh, node, extras };  // extras: `extras.tags` of any of them

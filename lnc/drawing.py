@@ -84,13 +84,11 @@ def _boxes(result: Result) -> dict[str, _Box]:
             lines.append(("", f"inserted: {node.op.name}"))
         kind = "inserted" if node.origin == "converter" else "node"
         boxes[node.name] = _Box(node.name, lines, wire_sources(node), kind)
-    if network.image is not None:
-        lines = [("name", "image"), ("paths", _short(paths.image or ""))]
-        reads = list(dict.fromkeys(t.node for t in network.image.terms))
-        boxes["\0image"] = _Box("\0image", lines, reads, "result")
-    for i, tap in enumerate(network.taps):
-        reads = list(dict.fromkeys(t.node for t in tap.terms))
-        boxes[f"\0tap{i}"] = _Box(f"\0tap{i}", [("name", f"tap {_short(tap.file)}")], reads, "result")
+    for i, (name, terms) in enumerate(network.results()):
+        lines = [("name", _short(name))]
+        if name == "image":
+            lines.append(("paths", _short(paths.image or "")))
+        boxes[f"\0result{i}"] = _Box(f"\0result{i}", lines, list(dict.fromkeys(t.node for t in terms)), "result")
     return boxes
 
 

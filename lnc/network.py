@@ -108,6 +108,16 @@ class Tap:
 
 
 @dataclass(frozen=True)
+class Probe:
+    """The irradiance of a wire at the sensors of a file, written to another."""
+
+    terms: tuple[Term, ...]
+    sensors: str
+    file: str
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True)
 class Expectation:
     """`expect PATH`: the light paths that the picture is to contain."""
 
@@ -126,7 +136,14 @@ class Network:
     tags: tuple[Tag, ...]
     image: Image | None
     taps: tuple[Tap, ...]
+    probes: tuple[Probe, ...]
     expectations: tuple[Expectation, ...]
+
+    def results(self) -> list[tuple[str, tuple[Term, ...]]]:
+        """What is asked for: what to call it, and the wires that it adds up."""
+        found = [("image", self.image.terms)] if self.image else []
+        found += [(f"tap {tap.file}", tap.terms) for tap in self.taps]
+        return found + [(f"probe {probe.file}", probe.terms) for probe in self.probes]
 
     def by_name(self) -> dict[str, Node]:
         return {node.name: node for node in self.nodes}
@@ -208,6 +225,7 @@ class Schedule:
     cycles: tuple[tuple[str, ...], ...]
     image: Image | None
     taps: tuple[Tap, ...]
+    probes: tuple[Probe, ...]
     tags: tuple[Tag, ...]
 
     def node(self, name: str) -> ScheduledNode:

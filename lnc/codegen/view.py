@@ -8,7 +8,7 @@ from pathlib import Path, PurePath
 from lnc.codegen.names import cpp_string, float_literal, unique_names
 from lnc.diagnostics import InternalError
 from lnc.library import snake_case
-from lnc.network import ParameterValue, PathValue, Schedule, ScheduledInput, ScheduledNode, Term
+from lnc.network import ParameterValue, PathValue, Probe, Schedule, ScheduledInput, ScheduledNode, Term
 
 POINTS = "Points"
 
@@ -95,6 +95,18 @@ class LayerView:
 
 
 @dataclass(frozen=True)
+class ProbeView:
+    """A wire that is measured at sensors."""
+
+    functor: str  # name of the type that evaluates the terms
+    terms: tuple[TermView, ...]
+    wire: str
+    sensors: str
+    file: str
+    on_surfaces: bool  # the wire is known on surfaces only
+
+
+@dataclass(frozen=True)
 class TagRuleView:
     bit: int
     name: str
@@ -115,6 +127,8 @@ class ProgramView:
     layers: tuple[LayerView, ...]
     emitters_layer: int  # the layer of the emitters that are seen; -1: there is none
     subtracts: bool
+    probes: tuple[ProbeView, ...]
+    has_image: bool
     slots: tuple[SlotView, ...]
     tags: tuple[TagRuleView, ...]
     image_paths: str
@@ -138,6 +152,8 @@ class _Builder:
         self.pulls = unique_names(wires, "pull_", self.members.values())
         self.constants = unique_names(wires, "k_", [*self.members.values(), *self.pulls.values()])
         self.variables = unique_names(wires, "seen_", [*self.members.values(), *self.pulls.values()])
+        numbers = [str(i + 1) for i in range(len(schedule.probes))]
+        self.probes = list(unique_names(numbers, "probe_", [*self.members.values()]).values())
         self.by_name = {n.name: n for n in schedule.nodes}
         self.tag_bits = {tag.name: i for i, tag in enumerate(schedule.tags)}
         self.layers: list[LayerView] = []
@@ -159,6 +175,8 @@ class _Builder:
             layers=tuple(self.layers),
             emitters_layer=emitters_layer,
             subtracts=any(t.weight < 0 for terms in self.all_terms() for t in terms),
+            probes=tuple(self.probe(i, probe) for i, probe in enumerate(self.schedule.probes)),
+            has_image=self.schedule.image is not None,
             slots=tuple(slot for n in self.schedule.nodes for slot in self.slots(n)),
             tags=tuple(
                 TagRuleView(i, tag.name, kind, glob)
@@ -302,7 +320,30 @@ class _Builder:
     def all_terms(self) -> list[tuple[Term, ...]]:
         """Every sum of the network."""
         sums = [i.terms for n in self.schedule.nodes for i in n.inputs] + [tap.terms for tap in self.schedule.taps]
+        sums += [probe.terms for probe in self.schedule.probes]
         return sums + ([self.schedule.image.terms] if self.schedule.image else [])
+
+    def probe(self, number: int, probe: Probe) -> ProbeView:
+        return ProbeView(
+            functor=self.probes[number],
+            terms=self.terms(probe.terms),
+            wire=_sum_text(probe.terms),
+            sensors=probe.sensors,
+            file=probe.file,
+            on_surfaces=any(self.on_surfaces(term.node, set()) for term in probe.terms),
+        )
+
+    def on_surfaces(self, name: str, seen: set[str]) -> bool:
+        """Is a wire known on surfaces only? Stored irradiance is, and what `to` restricts to surfaces with a tag."""
+        if name in seen:
+            return False
+        seen.add(name)
+        n = self.by_name[name]
+        if "irradiance" in n.contents or n.receivers is not None:
+            return True
+        passed = {rule.port for rule in n.op.paths if rule.content == "unchanged"}
+        sources = [term.node for i in n.inputs if i.port.name in passed for term in i.terms]
+        return any(self.on_surfaces(source, seen) for source in sources)
 
     def slots(self, n: ScheduledNode) -> list[SlotView]:
         found = []
@@ -346,6 +387,12 @@ def _weighted(weight: float, light_paths: str) -> str:
 
 def _bound(value: float | None, sign: str) -> str:
     return f"{sign}std::numeric_limits<double>::infinity()" if value is None else repr(float(value))
+
+
+def _sum_text(terms: tuple[Term, ...]) -> str:
+    """`a - b`."""
+    text = " ".join(f"{'-' if t.weight < 0 else '+'} {t.node}" for t in terms)
+    return text.removeprefix("+ ")
 
 
 def _header(n: ScheduledNode) -> str:

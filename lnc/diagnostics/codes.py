@@ -105,7 +105,7 @@ twice. Parameters are always given by name.""",
     Page(
         "LN0109",
         "no result",
-        """The network has neither an `image` nor a `tap`, so there is nothing to compute.""",
+        """The network has no `image`, `tap` or `probe`, so there is nothing to compute.""",
         "light = Lights()\n",
     ),
     Page(

@@ -50,7 +50,8 @@ class _Inserter:
         if image is not None:
             image = replace(image, terms=self._result(image.terms, "image", image.span))
         taps = tuple(replace(tap, terms=self._result(tap.terms, "tap", tap.span)) for tap in network.taps)
-        network = replace(network, nodes=tuple(self.nodes), image=image, taps=taps)
+        probes = tuple(replace(probe, terms=self._result(probe.terms, "probe", probe.span)) for probe in network.probes)
+        network = replace(network, nodes=tuple(self.nodes), image=image, taps=taps, probes=probes)
         return replace(self.typed, network=network, representations=self.representations)
 
     def _result(self, terms: tuple[Term, ...], name: str, span: Span) -> tuple[Term, ...]:

@@ -18,7 +18,7 @@ from lnc.conversions import cheapest_chains
 from lnc.diagnostics import Related, Reporter, did_you_mean, quote
 from lnc.library import Library, Operator, Parameter, Port
 from lnc.naming import Names
-from lnc.network import Expectation, Image, Input, Network, Node, ParameterValue, Tag, Tap, Term
+from lnc.network import Expectation, Image, Input, Network, Node, ParameterValue, Probe, Tag, Tap, Term
 from lnc.passes.parameters import parameter_value
 from lnc.paths.language import tags_in
 from lnc.source import Span
@@ -67,6 +67,7 @@ class _Resolver:
                 self._equation(equation)
         image: Image | None = None
         taps: list[Tap] = []
+        probes: list[Probe] = []
         expectations: list[Expectation] = []
         for statement in self.file.statements:
             match statement:
@@ -78,23 +79,29 @@ class _Resolver:
                         image = Image(terms or (), layers, statement.span)
                 case ast.TapStatement(wire, path):
                     terms = self._wire(wire, _Home("tap", statement.span))
-                    if not path.lower().endswith(".exr") or "\0" in path:
-                        message = f"a tap writes OpenEXR files (.exr), not {quote(path)}"
-                        self.reporter.error("LN0104", statement.file_span, message)
+                    self._check_file("a tap writes OpenEXR files (.exr)", ".exr", path, statement.file_span)
                     taps.append(Tap(terms or (), path, statement.span))
                 case ast.Expect(path, at_most):
                     self._check_tags(path)
                     expectations.append(Expectation(path, at_most, statement.span))
-                case ast.LightmapStatement() | ast.ProbeStatement():
-                    word = statement.span.text.split()[0]
-                    self.reporter.error("LN0110", statement.span, f"'{word}' is not supported yet")
+                case ast.ProbeStatement(wire, sensors, path):
+                    terms = self._wire(wire, _Home("probe", statement.span))
+                    self._check_file("a probe reads sensors from a table (.csv)", ".csv", sensors, statement.span)
+                    self._check_file("a probe writes a table (.csv)", ".csv", path, statement.span)
+                    if path == sensors:
+                        message = f"the probe would overwrite its sensors {quote(path)}"
+                        self.reporter.error("LN0104", statement.span, message, help="give its results another name")
+                    probes.append(Probe(terms or (), sensors, path, statement.span))
+                case ast.LightmapStatement():
+                    self.reporter.error("LN0110", statement.span, "'lightmap' is not supported yet")
                 case ast.OperatorDeclaration() | ast.RepresentationDeclaration():
                     message = "declarations belong into a folder of an operator library"
                     self.reporter.error("LN0110", statement.span, message, help="give its folder by --ops")
-        if image is None and not taps and not self.reporter.failed:
+        self._check_distinct([(tap.file, tap.span) for tap in taps] + [(probe.file, probe.span) for probe in probes])
+        if image is None and not taps and not probes and not self.reporter.failed:
             start = self.file.statements[0].span if self.file.statements else self.file.span
             self.reporter.error("LN0109", start, "the network has no result", help="add: image WIRE")
-        self._check_layers(image, taps)
+        self._check_layers(image)
         self._report_unused()
         return Network(
             name=names[0].name if names else name,
@@ -103,8 +110,21 @@ class _Resolver:
             tags=tuple(self.tags.values()),
             image=image,
             taps=tuple(taps),
+            probes=tuple(probes),
             expectations=tuple(expectations),
         )
+
+    def _check_file(self, what: str, suffix: str, path: str, span: Span) -> None:
+        if not path.lower().endswith(suffix) or "\0" in path:
+            self.reporter.error("LN0104", span, f"{what}, not {quote(path)}")
+
+    def _check_distinct(self, files: list[tuple[str, Span]]) -> None:
+        """No two results may be written to the same file."""
+        first: dict[str, Span] = {}
+        for path, span in files:
+            if path in first:
+                self._twice(span, f"two results are written to the file {quote(path)}", first[path])
+            first.setdefault(path, span)
 
     # --- Definitions --------------------------------------------------------------------------------------------------
 
@@ -457,8 +477,8 @@ class _Resolver:
             help = did_you_mean(name, self.tags)
             self.reporter.error("LN0102", path.span, f"no tag is called {quote(name)}", help=help)
 
-    def _check_layers(self, image: Image | None, taps: list[Tap]) -> None:
-        """No two layers of the picture, and no two taps, may have one name."""
+    def _check_layers(self, image: Image | None) -> None:
+        """No two layers of the picture may have one name."""
         layers: dict[str, Span] = {}
         if image is not None and image.layers:
             layers = {term.node: term.span for term in image.terms}
@@ -470,11 +490,6 @@ class _Resolver:
                 message = f"the picture has a layer {quote(value.value)} already"
                 self._twice(value.given.span, message, layers[value.value])
             layers.setdefault(value.value, value.given.span)
-        files: dict[str, Span] = {}
-        for tap in taps:
-            if tap.file in files:
-                self._twice(tap.span, f"a tap writes the file {quote(tap.file)} already", files[tap.file])
-            files.setdefault(tap.file, tap.span)
 
     def _twice(self, span: Span, message: str, first: Span, code: str = "LN0106") -> None:
         self.reporter.error(code, span, message, related=[Related(first, "first here")])

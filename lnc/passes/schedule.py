@@ -9,7 +9,7 @@ Nodes that no result needs are left out.
 from __future__ import annotations
 
 from lnc.graph import strong_components
-from lnc.network import Network, Node, Schedule, ScheduledInput, ScheduledNode
+from lnc.network import Network, Node, Schedule, ScheduledInput, ScheduledNode, Term
 from lnc.passes.check_cycles import wire_sources
 from lnc.source import Span
 
@@ -48,14 +48,14 @@ def schedule(network: Network, contents: dict[str, tuple[str, ...]]) -> Schedule
         cycles=cycles,
         image=network.image,
         taps=network.taps,
+        probes=network.probes,
         tags=network.tags,
     )
 
 
 def _live(network: Network, nodes: dict[str, Node]) -> list[str]:
     """What a result needs, in the order of the text."""
-    stack = [t.node for t in network.image.terms] if network.image else []
-    stack += [t.node for tap in network.taps for t in tap.terms]
+    stack = [term.node for _, terms in network.results() for term in terms]
     live: set[str] = set()
     while stack:
         name = stack.pop()
@@ -125,17 +125,18 @@ def print_schedule(plan: Schedule) -> str:
         lines.append(f"    contents {', '.join(node.contents) or 'none'}")
         for given in node.inputs:
             how = "complete " if given.port.complete else ""
-            terms = " ".join(f"{'+' if t.weight >= 0 else '-'} {abs(t.weight):g} {t.node}" for t in given.terms)
-            lines.append(f"    {how}{given.port.name} <- {terms}")
+            lines.append(f"    {how}{given.port.name} <- {_terms_text(given.terms)}")
         for parameter in node.parameters:
             value = getattr(parameter.value, "text", parameter.value)
             lines.append(f"    {parameter.name} = {value!r}")
     lines.append(f"prepare {', '.join(plan.prepare) or 'nothing'}")
     lines += [f"cycle {' -> '.join(cycle)}" for cycle in plan.cycles]
     if plan.image is not None:
-        terms = " ".join(f"{'+' if t.weight >= 0 else '-'} {abs(t.weight):g} {t.node}" for t in plan.image.terms)
-        lines.append(f"image {terms}" + (" layers" if plan.image.layers else ""))
-    for tap in plan.taps:
-        terms = " ".join(f"{'+' if t.weight >= 0 else '-'} {abs(t.weight):g} {t.node}" for t in tap.terms)
-        lines.append(f"tap {terms} -> {tap.file!r}")
+        lines.append(f"image {_terms_text(plan.image.terms)}" + (" layers" if plan.image.layers else ""))
+    lines += [f"tap {_terms_text(tap.terms)} -> {tap.file!r}" for tap in plan.taps]
+    lines += [f"probe {_terms_text(probe.terms)} at {probe.sensors!r} -> {probe.file!r}" for probe in plan.probes]
     return "\n".join(lines) + "\n"
+
+
+def _terms_text(terms: tuple[Term, ...]) -> str:
+    return " ".join(f"{'+' if t.weight >= 0 else '-'} {abs(t.weight):g} {t.node}" for t in terms)

@@ -20,7 +20,7 @@ def explicit(file: ast.File, network: Network) -> str:
         if node.origin != "equation":
             added.setdefault(node.statement, []).append(node)
     statements: list[ast.Statement] = []
-    taps = iter(network.taps)
+    taps, probes = iter(network.taps), iter(network.probes)
     for statement in file.statements:
         statements += [_equation(node, ast.Comments()) for node in added.pop(statement.span, ())]
         match statement:
@@ -31,6 +31,8 @@ def explicit(file: ast.File, network: Network) -> str:
                 statements.append(statement.changed(wire=_wire(network.image.terms, statement.span)))
             case ast.TapStatement():
                 statements.append(statement.changed(wire=_wire(next(taps).terms, statement.span)))
+            case ast.ProbeStatement():
+                statements.append(statement.changed(wire=_wire(next(probes).terms, statement.span)))
             case _:
                 statements.append(statement)
     return print_file(file.changed(statements=tuple(_tidy(statements))))

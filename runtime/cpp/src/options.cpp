@@ -489,7 +489,8 @@ Options parse_options(int argc, const char* const* argv, const ProgramInfo& prog
   if (!raw.samples.empty()) options.samples = static_cast<std::uint32_t>(parse_whole("--samples", raw.samples, 1, kMostSamples));
   if (!raw.time.empty()) options.time = parse_time_limit(raw.time);
   if (!raw.error.empty()) options.error = require_positive("--error", parse_quantity("--error", ParameterKind::ratio, raw.error), raw.error);
-  if (!options.samples && !options.time && !options.error) options.samples = kDefaultSamples;
+  options.default_samples = !options.samples && !options.time && !options.error;
+  if (options.default_samples) options.samples = kDefaultSamples;
   if (!raw.seed.empty()) options.seed = parse_seed(raw.seed);
   options.threads = raw.threads.empty() ? available_processors() : static_cast<int>(parse_whole("--threads", raw.threads, 1, kMostThreads));
   options.stats_path = raw.stats;
@@ -502,6 +503,13 @@ Options parse_options(int argc, const char* const* argv, const ProgramInfo& prog
   if (!raw.units.empty()) {
     options.units = parse_choice<Units>("--units", raw.units, {{"radiometric", Units::radiometric}, {"photometric", Units::photometric}});
   }
+  const auto unused = [&](const char* name, const std::string& value, bool used) {
+    if (!used && !value.empty()) options.unused.push_back(name);
+  };
+  unused("-o", raw.output, program.has_image);
+  unused("--preview", raw.preview, program.has_image);
+  unused("--size", raw.size, program.uses_camera());
+  unused("--camera", raw.camera, program.uses_camera());
   options.sets = raw.sets;
   for (const std::string& text : raw.sets) apply_set(text, program);
   return options;

@@ -39,30 +39,39 @@ void throw_if_interrupted() {
   if (interrupt_requested()) throw Interrupted{};
 }
 
-/// Two outputs under one name, or an input as output, would destroy each other.
-void check_names(const Options& options) {
-  struct Name {
-    const char* option;
-    const std::string& path;
-    bool is_output;
-  };
-  const Name names[] = {{"SCENE", options.scene, false},
-                        {"--env", options.environment_path, false},
-                        {"-o", options.output, true},
-                        {"--stats", options.stats_path, true},
-                        {"--preview", options.preview_path, true}};
-  for (const Name& a : names) {
-    for (const Name& b : names) {
-      if (&a >= &b || !b.is_output || a.path.empty() || b.path.empty()) continue;
+struct NamedFile {
+  const char* option;
+  std::string path;
+  bool is_output;
+};
+
+/// Every file that the run reads or writes, but for those that the scene names.
+std::vector<NamedFile> files_of(const Options& options, const ProgramInfo& program) {
+  std::vector<NamedFile> names{{"SCENE", options.scene, false},
+                               {"--env", options.environment_path, false},
+                               {"-o", program.has_image ? options.output : "", true},
+                               {"--stats", options.stats_path, true},
+                               {"--preview", program.has_image ? options.preview_path : "", true}};
+  for (const ProbeInfo& probe : program.probes) {
+    names.push_back({"the probe's sensors", probe.sensors, false});
+    names.push_back({"a probe", probe.file, true});
+  }
+  for (const LayerInfo& layer : program.layers)
+    if (layer.file) names.push_back({"a tap", layer.file, true});
+  return names;
+}
+
+/// Two outputs under one name, or an input as output, would destroy each other. And what cannot be written is said before
+/// the work begins.
+void check_files(const std::vector<NamedFile>& names) {
+  for (const NamedFile& a : names) {
+    for (const NamedFile& b : names) {
+      if (&a >= &b || !(a.is_output || b.is_output) || a.path.empty() || b.path.empty()) continue;
       if (same_file(a.path, b.path)) throw UsageError(std::string(a.option) + " and " + b.option + " are the same file, '" + b.path + "'");
     }
   }
-}
-
-void check_outputs(const Options& options) {
-  for (const std::string* path : {&options.output, &options.stats_path, &options.preview_path}) {
-    if (!path->empty()) check_output(*path);
-  }
+  for (const NamedFile& file : names)
+    if (file.is_output && !file.path.empty()) check_output(file.path);
 }
 
 RenderLimits limits_of(const Options& options, double prepare_seconds) {
@@ -105,13 +114,17 @@ class Preview {
   bool warned_ = false;
 };
 
-std::string summary(const Options& options, const Film& film, const RenderOutcome& outcome, const Stats& stats) {
-  char text[200];
-  const double rate = stats.seconds.render > 0 ? static_cast<double>(stats.rays.total) / (stats.seconds.prepare + stats.seconds.render) * 1e-6 : 0;
-  int used = std::snprintf(text, sizeof text, ": %dx%d, %u%s sample%s a pixel, %.2f s", film.width(), film.height(), outcome.samples,
-                           outcome.most_samples > outcome.samples ? " or more" : "", outcome.samples == 1 ? "" : "s", stats.seconds.total);
-  if (rate > 0) used += std::snprintf(text + used, sizeof text - static_cast<std::size_t>(used), ", %.2f million rays/s", rate);
-  return options.output + text + (outcome.interrupted ? ", interrupted" : "");
+std::string summary(const Options& options, const ProgramInfo& program, const RenderOutcome& outcome, const Stats& stats) {
+  std::string text;
+  if (program.has_image) text = options.output + ": " + std::to_string(stats.width) + "x" + std::to_string(stats.height) + ", ";
+  text += std::to_string(outcome.samples) + (outcome.most_samples > outcome.samples ? " or more sample" : " sample") + (outcome.samples == 1 ? "" : "s");
+  char numbers[80];
+  int used = std::snprintf(numbers, sizeof numbers, " a %s, %.2f s", program.uses_camera() ? "pixel" : "point", stats.seconds.total);
+  if (stats.seconds.render > 0 && stats.rays.total > 0) {
+    const double rate = static_cast<double>(stats.rays.total) / (stats.seconds.prepare + stats.seconds.render) * 1e-6;
+    std::snprintf(numbers + used, sizeof numbers - static_cast<std::size_t>(used), ", %.2f million rays/s", rate);
+  }
+  return text + numbers + (outcome.interrupted ? ", interrupted" : "");
 }
 
 void report_repairs(const Film& film) {
@@ -121,9 +134,37 @@ void report_repairs(const Film& film) {
           " were negative; they count as black. This is a fault of an operator or of the scene's values");
 }
 
+/// Renders what the camera sees into the film and writes it, if it is a picture.
+RenderOutcome render_picture(RunContext& context, RunCallbacks& callbacks, const RenderLimits& limits, Film& film) {
+  const Options& options = context.options;
+  const bool has_image = context.program.has_image;
+  context.progress.phase("render");
+  Preview preview(options.preview_path);
+  std::function<void(const Film&)> between_passes;
+  if (has_image && !options.preview_path.empty()) between_passes = [&](const Film& present) { preview.try_write(present); };
+  const RenderOutcome outcome = render_passes(
+      film, limits, context.workers, context.progress, [&](const Tile& tile, Film& target) { callbacks.render_tile(tile, target); },
+      between_passes, kPreviewInterval);
+  if (outcome.most_samples == 0) throw Interrupted{};
+  if (outcome.error) context.stats.error_estimate = outcome.error->rel_mse;
+  context.stats.repaired_samples = film.non_finite_samples() + film.negative_samples();
+  context.stats.width = film.width();
+  context.stats.height = film.height();
+  context.stats.seconds.render += outcome.seconds;
+
+  context.progress.phase("write");
+  report_repairs(film);
+  if (!has_image) return outcome;
+  write_exr(options.output, film, context.program, metadata_of(options, outcome), context.workers.count());
+  context.stats.seconds.total = seconds_since_start();
+  if (!options.preview_path.empty()) write_preview(options.preview_path, film);
+  return outcome;
+}
+
 int render_program(const Options& options, const ProgramInfo& program, RunCallbacks& callbacks, Progress& progress) {
-  check_names(options);
-  check_outputs(options);
+  check_files(files_of(options, program));
+  for (const char* option : options.unused)
+    note(std::string(option) + " is not used: the network has no " + (program.uses_camera() ? "image" : "picture, so no camera looks at the scene"));
 
   Workers workers(options.threads);
   Stats stats;
@@ -144,40 +185,31 @@ int render_program(const Options& options, const ProgramInfo& program, RunCallba
   stats.seconds.build = watch.seconds();
   throw_if_interrupted();
 
-  Film film(size.width, size.height, static_cast<int>(program.layers.size()),
-            program.subtracts ? Film::Samples::signed_values : Film::Samples::positive);
+  std::optional<Film> film;
+  if (program.uses_camera()) {
+    film.emplace(size.width, size.height, static_cast<int>(program.layers.size()),
+                 program.subtracts ? Film::Samples::signed_values : Film::Samples::positive);
+  }
   progress.phase("prepare");
   watch = Stopwatch();
   callbacks.prepare(context);
   stats.seconds.prepare = watch.seconds();
   throw_if_interrupted();
 
-  progress.phase("render");
-  Preview preview(options.preview_path);
-  std::function<void(const Film&)> between_passes;
-  if (!options.preview_path.empty()) between_passes = [&](const Film& present) { preview.try_write(present); };
-  const RenderOutcome outcome = render_passes(
-      film, limits_of(options, stats.seconds.prepare), workers, progress,
-      [&](const Tile& tile, Film& target) { callbacks.render_tile(tile, target); }, between_passes, kPreviewInterval);
-  if (outcome.most_samples == 0) throw Interrupted{};
+  RenderOutcome outcome = callbacks.measure(context, limits_of(options, stats.seconds.prepare));
   stats.seconds.render = outcome.seconds;
+  stats.seconds.total = seconds_since_start();
+  if (film) {
+    throw_if_interrupted();
+    outcome = render_picture(context, callbacks, limits_of(options, stats.seconds.prepare + stats.seconds.render), *film);
+  }
+  if (film) callbacks.finish(context, *film);
   stats.samples = outcome.samples;
   stats.interrupted = outcome.interrupted;
-  if (outcome.error) stats.error_estimate = outcome.error->rel_mse;
-  stats.repaired_samples = film.non_finite_samples() + film.negative_samples();
-  stats.width = film.width();
-  stats.height = film.height();
-
-  progress.phase("write");
-  report_repairs(film);
-  write_exr(options.output, film, program, metadata_of(options, outcome), workers.count());
-  stats.seconds.total = seconds_since_start();
-  callbacks.finish(context, film);
-  if (!options.preview_path.empty()) write_preview(options.preview_path, film);
   stats.peak_bytes = peak_memory_bytes();
   callbacks.collect(stats);
   if (!options.stats_path.empty()) write_output_file(options.stats_path, stats_json(stats));
-  progress.finish(summary(options, film, outcome, stats));
+  progress.finish(summary(options, program, outcome, stats));
   return outcome.interrupted ? kInterrupted : 0;
 }
 
@@ -196,7 +228,7 @@ int with_exit_status(const std::string& name, Action&& action) noexcept {
     report_error(name, error.what());
     return kFailed;
   } catch (const Interrupted&) {
-    report_error(name, "interrupted before the picture was begun; nothing is written");
+    report_error(name, "interrupted before the picture was begun; no picture is written");
     return kInterrupted;
   } catch (const std::bad_alloc&) {
     report_error(name, "out of memory: choose a smaller --size, fewer photons or samples in the network, or a smaller scene");

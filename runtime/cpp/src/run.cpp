@@ -123,6 +123,8 @@ PictureSize NetworkRun::load(RunContext& context) {
     environment_ = default_sky();
     has_environment_ = true;
   }
+  for (const ProbeInfo& info : program_.probes) probes_.emplace_back(info);
+  if (!program_.uses_camera()) return {};
   chosen_camera_ = choose_camera(data_, options.camera);
   size_ = picture_size(options, chosen_camera_.aspect);
   camera_ = CameraRays(chosen_camera_, size_.width, size_.height);
@@ -146,6 +148,28 @@ void NetworkRun::prepare(RunContext& context) {
   PrepareStep step(*prepare_context_, context, prepare_seconds_);
   prepare_network(step);
   sampler_.emplace(tracers_, program_.nodes.size());
+}
+
+RenderOutcome NetworkRun::measure(RunContext& context, const RenderLimits& limits) {
+  RenderOutcome all;
+  for (std::size_t i = 0; i < probes_.size() && !all.interrupted; ++i) {
+    context.progress.phase("render", program_.probes[i].file);
+    Probe& probe = probes_[i];
+    probe.place(tracer(0));
+    RenderLimits own = limits;
+    if (context.options.default_samples) own.samples = kDefaultProbeSamples;
+    // What follows gets its share of the time.
+    if (own.seconds) *own.seconds = (*own.seconds - all.seconds) / static_cast<double>(probes_.size() - i + (program_.uses_camera() ? 1 : 0));
+    Film film(probe.size(), 1, 0, program_.subtracts ? Film::Samples::signed_values : Film::Samples::positive);
+    const RenderOutcome outcome = render_passes(film, own, context.workers, context.progress,
+                                                [&](const Tile& tile, Film& target) { measure_tile(i, tile, target); });
+    if (outcome.samples == 0) throw Interrupted{};
+    probe.write(context.options.units);
+    const double seconds = all.seconds + outcome.seconds;
+    all = outcome;
+    all.seconds = seconds;
+  }
+  return all;
 }
 
 void NetworkRun::finish(RunContext&, const Film& film) {

@@ -358,7 +358,7 @@ TEST_CASE("an interrupt before the picture leaves the old one; a second signal k
   CHECK(seconds_to_end_after(bench, bench.start({"s.gltf"}), SIGINT, 300, status) < 1);
   CHECK(status == 130);
   CHECK(read(bench.folder / "out.exr") == "old");
-  CHECK(contains(bench.errors(), "nothing is written"));
+  CHECK(contains(bench.errors(), "no picture is written"));
 
   bench.stub.fault = [] {
     for (int i = 0; i < 6000; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));

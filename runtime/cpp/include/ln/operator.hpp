@@ -24,7 +24,9 @@ namespace ln {
 /// sees itself.
 template <class Request>
 bool reaches(Request& request, TagSet to) {
-  return to == kAnyTag || (request.tracer().scene().part_tags(request.at().part) & to);
+  if (to == kAnyTag) return true;
+  const std::uint32_t part = request.at().part;
+  return part != kNoPart && (request.tracer().scene().part_tags(part) & to);
 }
 
 /// A path expression of one event: the events that it allows on a surface. `Via` is a generated automaton:

@@ -26,15 +26,17 @@ struct Options {
   std::optional<std::uint32_t> samples;  // camera paths per pixel
   std::optional<double> time;            // wall seconds of prepare and render
   std::optional<double> error;           // estimated relMSE of the picture
+  bool default_samples = false;          // none was given
   std::uint64_t seed = 0;
   int threads = 1;  // parse_options: all processors that this process may use
   std::vector<std::string> sets;  // "node.parameter=value" as given; the slots hold the values already
   std::string stats_path, preview_path, environment_path;  // empty: none
   ProgressMode progress = ProgressMode::automatic;
   Units units = Units::radiometric;
+  std::vector<const char*> unused;  // options that were given, though this network has nothing to do with them
 };
 
-inline constexpr std::uint32_t kDefaultSamples = 64;
+inline constexpr std::uint32_t kDefaultSamples = 64, kDefaultProbeSamples = 1024;
 inline constexpr int kDefaultSide = 640;
 inline constexpr int kLargestSide = 65'536;
 inline constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;

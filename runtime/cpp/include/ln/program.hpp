@@ -7,14 +7,12 @@
 #include <string>
 
 #include "ln/options.hpp"
+#include "ln/render_passes.hpp"
 
 namespace ln {
 
-class Film;
 class Progress;
-class Workers;
 struct Stats;
-struct Tile;
 
 /// What a parameter measures. In brackets: the type of the variable behind ParameterSlot::value, and its unit.
 enum class ParameterKind : std::uint8_t {
@@ -55,6 +53,14 @@ struct LayerInfo {
   const char* file = nullptr;  // a tap: a picture of its own instead of a layer
 };
 
+/// A wire whose irradiance is measured at the sensors of a file.
+struct ProbeInfo {
+  const char* wire;     // as the network has it
+  const char* sensors;  // file that is read
+  const char* file;     // file that is written
+  bool on_surfaces = false;  // the wire is known on surfaces only, not in free space
+};
+
 struct ProgramInfo {
   const char* network;
   const char* source_file;  // the .ln file's name without its folder
@@ -63,6 +69,11 @@ struct ProgramInfo {
   std::span<const NodeInfo> nodes = {};
   std::span<const LayerInfo> layers = {};
   bool subtracts = false;  // some wire is subtracted, so samples may be negative
+  std::span<const ProbeInfo> probes = {};
+  bool has_image = true;
+
+  /// Are there camera rays?
+  bool uses_camera() const { return has_image || !layers.empty(); }
 };
 
 /// What the parts of a run share.
@@ -85,11 +96,13 @@ class RunCallbacks {
   virtual void build(RunContext& context) = 0;
   /// Work of the operators before the picture; name each with context.progress.phase("prepare", node).
   virtual void prepare(RunContext& context) = 0;
+  /// Results other than pictures, each written when it is done, within `limits`. Returns how far they came.
+  virtual RenderOutcome measure(RunContext&, const RenderLimits&) { return {}; }
   /// Adds samples [tile.first_sample, tile.first_sample + tile.sample_count) of the tile's pixels to the film; called from
   /// many threads. What it adds must depend on pixel and sample number only, never on tile, worker or order. It returns early,
   /// between two samples of a pixel, when tile.stopped().
   virtual void render_tile(const Tile& tile, Film& film) = 0;
-  /// After the picture is written: wire taps. Called after an interrupt too.
+  /// After the picture: taps that are pictures. Called after an interrupt too.
   virtual void finish(RunContext&, const Film&) {}
   /// Fills scene, rays and nodes; seconds, samples and peak_bytes are filled already.
   virtual void collect(Stats& stats) = 0;

@@ -5,18 +5,20 @@
 //   void prepare(PrepareStep& step)              work before the picture: step(node id, [&](PrepareContext&) { ... }) each
 //   Color image(Request&) const                  what the eye gets from a surface point; a template
 //   static constexpr int emitters_layer          the layer that shows the emitters that are seen; -1: none does
-//   std::span<const ParameterSlot> parameters()  and the other tables of ProgramInfo
+//   auto probes() const                          for each probe, in order, what evaluates its wire: a tuple
 
 #include <atomic>
 #include <memory>
 #include <optional>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "ln/camera.hpp"
 #include "ln/film.hpp"
 #include "ln/operator.hpp"
 #include "ln/prepare.hpp"
+#include "ln/probe.hpp"
 #include "ln/program.hpp"
 #include "ln/render_passes.hpp"
 #include "ln/request.hpp"
@@ -62,14 +64,17 @@ class NetworkRun : public RunCallbacks {
   PictureSize load(RunContext& context) override;
   void build(RunContext& context) override;
   void prepare(RunContext& context) override;
+  RenderOutcome measure(RunContext& context, const RenderLimits& limits) override;
   void finish(RunContext& context, const Film& film) override;
   void collect(Stats& stats) override;
 
  protected:
   virtual void prepare_network(PrepareStep& step) = 0;
+  virtual void measure_tile(std::size_t probe, const Tile& tile, Film& film) = 0;
 
   const Scene& scene() const { return *scene_; }
   const CameraRays& camera() const { return camera_; }
+  Probe& probe(std::size_t i) { return probes_[i]; }
   Tracer& tracer(int worker) { return tracers_[static_cast<std::size_t>(worker)]; }
   std::uint32_t seed_hash() const { return seed_hash_; }
 
@@ -87,6 +92,7 @@ class NetworkRun : public RunCallbacks {
   std::optional<PrepareContext> prepare_context_;
   std::vector<double> prepare_seconds_;
   std::vector<Tracer> tracers_;
+  std::vector<Probe> probes_;
   std::optional<NodeSampler> sampler_;
   std::uint32_t seed_hash_ = 0;
 };
@@ -129,20 +135,6 @@ LN_INLINE Color eye_radiance(const Network& network, Tracer& tracer, Ray ray, co
   }
 }
 
-/// Calls `work(stream)` for each sample that the tile wants of the pixel with this key.
-template <class Work>
-void for_samples(std::uint32_t key, const Tile& tile, Tracer& tracer, Work&& work) {
-  constexpr std::uint32_t kFewest = 4;  // below, computing a whole block would cost more than it saves
-  const std::uint32_t end = tile.first_sample + tile.sample_count;
-  for (std::uint32_t i = tile.first_sample; i < end;) {
-    const std::uint32_t first = i / SampleBlock::kSamples * SampleBlock::kSamples;
-    const std::uint32_t stop = std::min(end, first + SampleBlock::kSamples);
-    SampleBlock* block = stop - i >= kFewest ? &tracer.samples() : nullptr;
-    if (block) block->begin(key, first);
-    for (; i < stop; ++i) work(SampleStream(key, i, block));
-  }
-}
-
 template <class Network>
 class NetworkProgram final : public NetworkRun {
  public:
@@ -155,7 +147,7 @@ class NetworkProgram final : public NetworkRun {
       for (int x = tile.x0; x < tile.x1; ++x) {
         if (tile.stopped()) break;
         const std::uint32_t key = hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)), seed_hash());
-        for_samples(key, tile, tracer, [&](const SampleStream& random) { render_sample(x, y, random, tracer, film); });
+        for_samples(key, tile.first_sample, tile.first_sample + tile.sample_count, tracer, [&](const SampleStream& random) { render_sample(x, y, random, tracer, film); });
       }
     }
     tracer.enter(Tracer::kIdle);
@@ -163,6 +155,14 @@ class NetworkProgram final : public NetworkRun {
 
  protected:
   void prepare_network(PrepareStep& step) override { network_.prepare(step); }
+
+  void measure_tile(std::size_t number, const Tile& tile, Film& film) override {
+    std::size_t i = 0;
+    const auto measure = [&](const auto& wire) {
+      if (i++ == number) this->probe(number).measure(tile, this->tracer(tile.worker), seed_hash(), wire, film);
+    };
+    std::apply([&](const auto&... wire) { (measure(wire), ...); }, network_.probes());
+  }
 
  private:
   void render_sample(int x, int y, const SampleStream& random, Tracer& tracer, Film& film) {

@@ -33,6 +33,8 @@ struct TagRule {
   const char* glob;
 };
 
+inline constexpr std::uint32_t kNoPart = 0xffffffffu;
+
 class Scene;
 
 /// A point of a surface where light is scattered towards `wo`, with its BSDF.
@@ -43,6 +45,9 @@ class Interaction {
   /// The flat surface at `hit`, seen along its normal from the front or the back, with another BSDF: a receiver. Both
   /// `scene` and `bsdf` must outlive it.
   Interaction(const Scene& scene, const Hit& hit, bool front, const Bsdf& bsdf);
+  /// A receiver with a normal of its own: on the surface at `hit`, which blocks what comes from behind it, or, where nothing was
+  /// hit, at `position` in space. Out there it is of no part (kNoPart) and carries no tag.
+  Interaction(const Scene& scene, const Hit& hit, const Vec3& position, const Vec3& normal, const Bsdf& bsdf);
   Interaction(const Interaction&) = delete;
   Interaction& operator=(const Interaction&) = delete;
 
@@ -57,7 +62,7 @@ class Interaction {
   Vec3 wo;                  // towards where the light is wanted, world space
   Vec3 wo_local;
   Hit hit;
-  std::uint32_t part;
+  std::uint32_t part;       // or kNoPart
   bool front;               // wo is on the front side
   Color transmittance{1};   // of the ray that led here, where it ran through an absorbing solid
 
@@ -138,6 +143,17 @@ inline Interaction::Interaction(const Scene& scene, const Hit& on, bool seen_fro
   scene.locate(hit, at);
   wo = front ? at.ng : -at.ng;
   frame = make_frame(wo);
+}
+
+inline Interaction::Interaction(const Scene& scene, const Hit& on, const Vec3& position, const Vec3& normal, const Bsdf& bsdf)
+    : frame(make_frame(normal)), wo(normal), wo_local(0, 0, 1), hit(on), part(kNoPart), front(true), bsdf_(&bsdf) {
+  if (hit.found()) {
+    scene.locate(hit, at);
+    part = scene.data_.triangle_part[hit.triangle];
+    front = glm::dot(normal, at.ng) >= 0;
+  } else {
+    at = {position, position_error(glm::abs(position)), normal};
+  }
 }
 
 }  // namespace ln

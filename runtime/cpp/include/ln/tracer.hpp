@@ -66,4 +66,17 @@ class Tracer {
   NodeId present_node_ = kIdle;
 };
 
+/// Calls `work(stream)` for samples [begin, end) of the stream with this key.
+template <class Work>
+void for_samples(std::uint32_t key, std::uint32_t begin, std::uint32_t end, Tracer& tracer, Work&& work) {
+  constexpr std::uint32_t kFewest = 4;  // below, computing a whole block would cost more than it saves
+  for (std::uint32_t i = begin; i < end;) {
+    const std::uint32_t first = i / SampleBlock::kSamples * SampleBlock::kSamples;
+    const std::uint32_t stop = std::min(end, first + SampleBlock::kSamples);
+    SampleBlock* block = stop - i >= kFewest ? &tracer.samples() : nullptr;
+    if (block) block->begin(key, first);
+    for (; i < stop; ++i) work(SampleStream(key, i, block));
+  }
+}
+
 }  // namespace ln

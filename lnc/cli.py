@@ -76,7 +76,9 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("-o", dest="output", metavar="PROGRAM")
     build.add_argument("--emit-cpp", metavar="FILE", help="also write the C++ text")
     build.add_argument("--scene", metavar="SCENE")
-    build.add_argument("--reference", metavar="EXPR")
+    build.add_argument(
+        "--reference", metavar="EXPR", help="make the plain reference tracer of these light paths; FILE defines tags"
+    )
     build.add_argument("--portable", action="store_true", help="code for any x86-64 processor instead of this one")
     build.add_argument("--dump-after", action="append", default=[], metavar="STAGE")
     build.set_defaults(run=_compile)

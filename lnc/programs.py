@@ -10,15 +10,26 @@ from pathlib import Path
 
 from lnc.build import BuildError, BuildOptions, build_program, program_path
 from lnc.cli import FINE, USAGE, WRONG, fail, report
-from lnc.driver import STAGES, Result, Unreadable, compile_file, describe_paths, describe_seen, write_text
+from lnc.diagnostics import Reporter
+from lnc.driver import (
+    STAGES,
+    Result,
+    Unreadable,
+    compile_file,
+    describe_paths,
+    describe_seen,
+    read_source,
+    write_text,
+)
 from lnc.locations import library_folders
 
 
 def compile_command(arguments: argparse.Namespace) -> int:
     """`lnc compile FILE -o PROGRAM`."""
-    for option in ("scene", "reference"):
-        if getattr(arguments, option) is not None:
-            return fail(f"--{option} is not supported yet")
+    if arguments.scene is not None:
+        return fail("--scene is not supported yet")
+    if arguments.reference is not None:
+        return _compile_reference(arguments)
     if arguments.file is None:
         return fail("compile needs a network: lnc compile FILE -o PROGRAM")
     unknown = [stage for stage in arguments.dump_after if stage not in STAGES]
@@ -30,7 +41,42 @@ def compile_command(arguments: argparse.Namespace) -> int:
     result, status = _read(arguments)
     if result is None or status != FINE:
         return status
-    cpp = write_cpp(result)
+    return _finish(write_cpp(result), arguments)
+
+
+def _compile_reference(arguments: argparse.Namespace) -> int:
+    """`lnc compile [FILE] --reference EXPR -o PROGRAM`: FILE's tags, no network."""
+    from lnc.codegen.languages import reference_view
+    from lnc.codegen.write import write_reference
+    from lnc.reference import read_reference
+    from lnc.syntax.parse import parse
+
+    if arguments.dump_after:
+        return fail("--dump-after shows stages of a network; --reference has none")
+    if arguments.output is None and arguments.emit_cpp is None:
+        return fail("compile needs the program's name: -o PROGRAM")
+    reporter = Reporter()
+    network = None
+    if arguments.file is not None:
+        try:
+            network = parse(read_source(arguments.file), reporter)
+        except Unreadable as error:
+            return fail(str(error))
+        if reporter.failed:
+            report(reporter.sorted())
+            return WRONG
+    reference = read_reference(arguments.reference, network, reporter)
+    report(reporter.sorted())
+    if reference is None:
+        return USAGE
+    if reference.lost is not None:
+        message = "no particle and no eye path finds such light from a delta emitter; it is missing in the picture"
+        print(f"lnc: warning: {reference.lost}: {message}", file=sys.stderr)
+    return _finish(write_reference(reference_view(reference)), arguments)
+
+
+def _finish(cpp: str, arguments: argparse.Namespace) -> int:
+    """Write the C++ text and the program, where they are wanted."""
     try:
         if arguments.emit_cpp is not None:
             write_text(arguments.emit_cpp, cpp)

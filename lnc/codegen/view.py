@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
+from lnc.codegen.languages import TagRuleView, tag_rules
 from lnc.codegen.names import cpp_string, float_literal, unique_names
 from lnc.diagnostics import InternalError
 from lnc.library import snake_case
@@ -107,14 +108,6 @@ class ProbeView:
 
 
 @dataclass(frozen=True)
-class TagRuleView:
-    bit: int
-    name: str
-    kind: str
-    glob: str
-
-
-@dataclass(frozen=True)
 class ProgramView:
     network: str
     file: str
@@ -178,11 +171,7 @@ class _Builder:
             probes=tuple(self.probe(i, probe) for i, probe in enumerate(self.schedule.probes)),
             has_image=self.schedule.image is not None,
             slots=tuple(slot for n in self.schedule.nodes for slot in self.slots(n)),
-            tags=tuple(
-                TagRuleView(i, tag.name, kind, glob)
-                for i, tag in enumerate(self.schedule.tags)
-                for kind, glob in tag.globs
-            ),
+            tags=tag_rules(self.schedule.tags),
             image_paths=image_paths,
         )
 

@@ -12,6 +12,7 @@ Representations are left to typecheck and insert_converters.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from lnc.conversions import cheapest_chains
@@ -34,6 +35,26 @@ def resolve(
     return _Resolver(file, library, reporter, broken).run(name)
 
 
+def define_tags(statements: Iterable[ast.Statement], reporter: Reporter) -> dict[str, Tag]:
+    """The tags that statements define, by name."""
+    tags: dict[str, Tag] = {}
+    for statement in statements:
+        if not isinstance(statement, ast.TagStatement):
+            continue
+        if statement.name in tags:
+            message = f"the tag {quote(statement.name)} is defined twice"
+            first = Related(tags[statement.name].span, "first here")
+            reporter.error("LN0106", statement.name_span, message, related=[first])
+            continue
+        for glob in statement.globs:
+            if glob.kind not in TAG_KINDS:
+                message = f"a tag is a glob on material, mesh or node names, not on {quote(glob.kind)}"
+                reporter.error("LN0102", glob.span, message, help=did_you_mean(glob.kind, TAG_KINDS))
+        globs = tuple((g.kind, g.glob) for g in statement.globs) or (("extras", statement.name),)
+        tags[statement.name] = Tag(statement.name, globs, statement.name_span)
+    return tags
+
+
 @dataclass(frozen=True)
 class _Home:
     """Where an expression stands: the name that calls inside it derive theirs from, and the statement."""
@@ -49,7 +70,7 @@ class _Resolver:
         self.library = library
         self.reporter = reporter
         self.equations: dict[str, ast.Equation] = {}
-        self.tags: dict[str, Tag] = {}
+        self.tags = define_tags(file.statements, reporter)
         self.nodes: list[Node] = []
         self.names = Names(())
         self.made: set[str] = set()  # names in `nodes`
@@ -137,20 +158,6 @@ class _Resolver:
                 else:
                     self.equations[statement.name] = statement
                     self.names.free(statement.name)
-            elif isinstance(statement, ast.TagStatement):
-                if statement.name in self.tags:
-                    first = self.tags[statement.name].span
-                    self._twice(statement.name_span, f"the tag {quote(statement.name)} is defined twice", first)
-                else:
-                    self.tags[statement.name] = self._tag(statement)
-
-    def _tag(self, statement: ast.TagStatement) -> Tag:
-        for glob in statement.globs:
-            if glob.kind not in TAG_KINDS:
-                message = f"a tag is a glob on material, mesh or node names, not on {quote(glob.kind)}"
-                self.reporter.error("LN0102", glob.span, message, help=did_you_mean(glob.kind, TAG_KINDS))
-        globs = tuple((g.kind, g.glob) for g in statement.globs) or (("extras", statement.name),)
-        return Tag(statement.name, globs, statement.name_span)
 
     def _equation(self, equation: ast.Equation) -> None:
         if equation.representation is not None and equation.representation not in self.library.representations:

@@ -112,7 +112,8 @@ Events possible_events(const Material& m) {
 
 }  // namespace
 
-Scene::Scene(SceneData data, std::span<const TagRule> tags, int threads, const Image* environment) : data_(std::move(data)) {
+Scene::Scene(SceneData data, std::span<const TagRule> tags, int threads, const Image* environment)
+    : data_(std::move(data)), environment_(environment) {
   sort_by_coverage(data_);
   accel_ = Accel(data_, threads);
 
@@ -147,6 +148,10 @@ Scene::Scene(SceneData data, std::span<const TagRule> tags, int threads, const I
 std::unique_ptr<Emitters> Scene::emitters_tagged(TagSet tags) const {
   return std::make_unique<Emitters>(data_, nullptr, [&](std::size_t part) { return (part_tags_[part] & tags) != 0; },
                                     [&](std::size_t light) { return (light_tags_[light] & tags) != 0; });
+}
+
+std::unique_ptr<Emitters> Scene::selected_emitters(const EmitterSelection& selection, bool with_environment) const {
+  return std::make_unique<Emitters>(data_, with_environment ? environment_ : nullptr, selection);
 }
 
 int Scene::tag_matches(int t) const {

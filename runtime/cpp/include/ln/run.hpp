@@ -70,10 +70,11 @@ class NetworkRun : public RunCallbacks {
 
  protected:
   virtual void prepare_network(PrepareStep& step) = 0;
-  virtual void measure_tile(std::size_t probe, const Tile& tile, Film& film) = 0;
+  virtual void measure_tile(std::size_t /*probe*/, const Tile&, Film&) {}
 
   const Scene& scene() const { return *scene_; }
   const CameraRays& camera() const { return camera_; }
+  PictureSize size() const { return size_; }
   Probe& probe(std::size_t i) { return probes_[i]; }
   Tracer& tracer(int worker) { return tracers_[static_cast<std::size_t>(worker)]; }
   std::uint32_t seed_hash() const { return seed_hash_; }

@@ -77,7 +77,7 @@ class Interaction {
 
 class Scene {
  public:
-  /// Builds the acceleration structure and everything derived from `data`. Throws Error.
+  /// Builds the acceleration structure and everything derived from `data`; `environment`, if any, must outlive it. Throws Error.
   Scene(SceneData data, std::span<const TagRule> tags, int threads, const Image* environment);
 
   const SceneData& data() const { return data_; }
@@ -86,8 +86,12 @@ class Scene {
   const Emitters& emitters() const { return *emitters_; }
   /// The emitters with one of these tags.
   std::unique_ptr<Emitters> emitters_tagged(TagSet tags) const;
+  /// The emitters that are selected by number, with or without the environment.
+  std::unique_ptr<Emitters> selected_emitters(const EmitterSelection& selection, bool with_environment) const;
   /// Bit t is set if the part matches tag t of the network.
   TagSet part_tags(std::uint32_t part) const { return part_tags_[part]; }
+  /// The same for a punctual light.
+  TagSet light_tags(std::size_t light) const { return light_tags_[light]; }
   /// Number of parts and lights that match tag `t`.
   int tag_matches(int t) const;
   /// Events that some surface of the scene can scatter by (conservative: from the ranges of textures).
@@ -120,6 +124,7 @@ class Scene {
   std::vector<Baked> baked_;                                     // by part
   std::vector<std::unique_ptr<DielectricTable>> dielectrics_;    // by material; null where not needed
   std::vector<TagSet> part_tags_, light_tags_;
+  const Image* environment_;
   std::unique_ptr<Emitters> emitters_;
   Events events_ = Events::none;
 };

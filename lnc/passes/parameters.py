@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 
 from lnc.diagnostics import Reporter, did_you_mean, quote
 from lnc.library import Parameter, Scalar
@@ -114,12 +114,7 @@ def _path(
     broken: frozenset[str],
 ) -> PathValue:
     used = tags_in(path)
-    unknown = sorted(used - set(tags))
-    if unknown:
-        help = did_you_mean(unknown[0], tags)
-        if unknown[0] in broken:
-            raise ValueFault("")
-        reporter.error("LN0102", path.span, f"no tag is called {quote(unknown[0])}", help=help)
+    if report_unknown_tags(path, tags, reporter, broken):
         raise ValueFault("")
     if len(used) > TAG_LIMIT:
         raise ValueFault(f"a path may name {TAG_LIMIT} tags at most")
@@ -141,6 +136,34 @@ def _path(
         wanted = "exactly one event is" if one else f"{parameter.low:g} to {parameter.high:g} events are"
         raise ValueFault(f"{wanted} wanted")
     return value
+
+
+def report_unknown_tags(
+    path: ast.PathExpression, tags: Collection[str], reporter: Reporter, broken: frozenset[str]
+) -> bool:
+    """LN0102 for each tag of a path that the network does not define; True if there is one, also one in `broken`."""
+    unknown = tags_in(path) - set(tags)
+    reported = set(broken)
+    for name, span in _tag_places(path):
+        if name in unknown and name not in reported:
+            reporter.error("LN0102", span, f"no tag is called {quote(name)}", help=did_you_mean(name, tags))
+            reported.add(name)
+    return bool(unknown)
+
+
+def _tag_places(path: ast.PathExpression) -> Iterator[tuple[str, Span]]:
+    """Every name of a tag with its place, in the order of the text but for `lpe`, which is read backwards."""
+    match path:
+        case ast.PathName(name=name, span=span, tag=tag):
+            yield name, span if tag is None else Span(span.source, span.start, span.start + len(name))
+        case ast.PathConcat(items) | ast.PathUnion(items):
+            for item in items:
+                yield from _tag_places(item)
+        case ast.PathRepeat(item) | ast.PathTagged(item):
+            yield from _tag_places(item)
+    match path:
+        case ast.PathEvents(tag=ast.TagRef() as tag) | ast.PathName(tag=ast.TagRef() as tag) | ast.PathTagged(tag=tag):
+            yield tag.name, tag.span
 
 
 def letters_in(path: ast.PathExpression) -> set[str]:

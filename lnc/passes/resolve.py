@@ -20,8 +20,7 @@ from lnc.diagnostics import Related, Reporter, did_you_mean, quote
 from lnc.library import Library, Operator, Parameter, Port
 from lnc.naming import Names
 from lnc.network import Expectation, Image, Input, Network, Node, ParameterValue, Probe, Tag, Tap, Term
-from lnc.passes.parameters import parameter_value
-from lnc.paths.language import tags_in
+from lnc.passes.parameters import parameter_value, report_unknown_tags
 from lnc.source import Span
 from lnc.syntax import ast
 
@@ -103,7 +102,7 @@ class _Resolver:
                     self._check_file("a tap writes OpenEXR files (.exr)", ".exr", path, statement.file_span)
                     taps.append(Tap(terms or (), path, statement.span))
                 case ast.Expect(path, at_most):
-                    self._check_tags(path)
+                    report_unknown_tags(path, self.tags, self.reporter, self.broken)
                     expectations.append(Expectation(path, at_most, statement.span))
                 case ast.ProbeStatement(wire, sensors, path):
                     terms = self._wire(wire, _Home("probe", statement.span))
@@ -478,11 +477,6 @@ class _Resolver:
     def _unknown_representation(self, name: str, span: Span) -> None:
         help = did_you_mean(name, self.library.representations)
         self.reporter.error("LN0102", span, f"no representation is called {quote(name)}", help=help)
-
-    def _check_tags(self, path: ast.PathExpression) -> None:
-        for name in sorted(tags_in(path) - set(self.tags) - self.broken):
-            help = did_you_mean(name, self.tags)
-            self.reporter.error("LN0102", path.span, f"no tag is called {quote(name)}", help=help)
 
     def _check_layers(self, image: Image | None) -> None:
         """No two layers of the picture may have one name."""

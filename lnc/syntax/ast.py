@@ -81,6 +81,14 @@ class PathEmpty(Record):
     span: Span
 
 
+class PathLpe(PathUnion):
+    """`lpe "C<RD>.*L"`: the text between the quotation marks; for every pass a union of the one path that it means."""
+
+    items: tuple[PathExpression, ...]
+    span: Span
+    text: str
+
+
 PathExpression = PathEvents | PathName | PathTagged | PathConcat | PathUnion | PathRepeat | PathEmpty
 
 # --- Values of parameters ---------------------------------------------------------------------------------------------

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from lnc.diagnostics import Reporter, quote
+from lnc.paths.lpe import REPEAT_LIMIT, read_lpe
 from lnc.source import SourceFile, Span
 from lnc.syntax import ast
 from lnc.syntax.tokens import END, Token, Tokens
 
 Children = list[Any]
 ESCAPES = {"n": "\n", "t": "\t", '"': '"', "\\": "\\"}
-REPEAT_LIMIT = 1000
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ class Builder:
     # --- Light paths --------------------------------------------------------------------------------------------------
 
     def path(self, span: Span, children: Children) -> ast.PathExpression:
-        items = [i for child in children for i in (child.items if isinstance(child, ast.PathUnion) else (child,))]
+        items = [i for child in children for i in (child.items if type(child) is ast.PathUnion else (child,))]
         return items[0] if len(items) == 1 else ast.PathUnion(tuple(items), span)
 
     def path_concat(self, span: Span, children: Children) -> ast.PathExpression:
@@ -257,6 +257,11 @@ class Builder:
 
     def path_group(self, span: Span, children: Children) -> ast.PathExpression:
         return children[0] if children else ast.PathEmpty(span)
+
+    def path_lpe(self, span: Span, children: Children) -> ast.PathLpe:
+        (token,) = children
+        inside = Span(self.source, token.start + 1, token.end - 1)
+        return ast.PathLpe((read_lpe(inside, self.reporter),), span, inside.text)
 
     # --- Declarations -------------------------------------------------------------------------------------------------
 

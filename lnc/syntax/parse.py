@@ -86,14 +86,18 @@ class _Parser:
             saved, saved_at = self.stack.copy(), at
 
     def _kind(self, at: int) -> str:
-        """The terminal of a token: a keyword only where the grammar asks for it and no `=` or `:` follows."""
+        """The terminal of a token: a keyword only where the grammar asks for it and no `=` or `:` follows.
+
+        `lpe` is one only before a text, since a tag of that name can stand in a path, too.
+        """
         token = self.tokens[at]
         keyword = self.tables.keywords.get(token.text) if token.type == "NAME" else None
         if keyword is None:
             return token.type
-        if self.tokens[at + 1].text in ("=", ":") or not self._accepts(keyword):
+        following = self.tokens[at + 1]
+        if following.text in ("=", ":") or (keyword == "LPE" and following.type != "STRING"):
             return token.type
-        return keyword
+        return keyword if self._accepts(keyword) else token.type
 
     def _accepts(self, terminal: str) -> bool:
         """Whether a terminal fits here: the reductions that it causes, played through on the states alone."""
@@ -220,7 +224,7 @@ class _Parser:
         fitting = {symbol for symbol in row if (symbol.isupper() or symbol in (NEWLINE, END)) and self._accepts(symbol)}
         words = {self._name(symbol) for symbol in fitting}
         if {"LETTER", "NAME", "DOT"} <= fitting:
-            words -= {"an event letter", "a name", "'.'", "'..'", "'...'", "'['", "'('"}
+            words -= {"an event letter", "a name", "'.'", "'..'", "'...'", "'['", "'('", "'lpe'"}
             words.add("a light path")
         if not 0 < len(words) <= 4:
             return ""

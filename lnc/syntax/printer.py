@@ -215,6 +215,8 @@ def _path(path: ast.PathExpression, within: int) -> str:
             return "()"
         case ast.PathTagged(item, tag):
             return f"({_path(item, _UNION)}){_tag(tag)}"
+        case ast.PathLpe(text=text):
+            return f'lpe "{text}"'
         case ast.PathUnion(items):
             text = " | ".join(_path(i, _CONCAT) for i in items)
             if all(len(i) == 1 for i in text.split(" | ")):

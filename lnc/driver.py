@@ -1,7 +1,7 @@
 """The spine: the rooms that a network walks through, in order.
 
 parse -> expand_macros -> resolve -> typecheck -> insert_converters -> check_cycles -> contents -> schedule
-                                     (-> light_paths, for explain and graph)                (-> codegen, build)
+      -> check_paths                 (-> light_paths, for explain and graph)                (-> codegen, build)
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from lnc.library import Library
 from lnc.library_reader import load_library
 from lnc.network import PathReport, Schedule, TypedNetwork
 from lnc.passes.check_cycles import check_cycles
+from lnc.passes.check_paths import check_paths
 from lnc.passes.contents import contents
 from lnc.passes.expand_macros import expand_macros
 from lnc.passes.insert_converters import insert_converters
@@ -118,6 +119,8 @@ def compile_network(source: SourceFile, library: Library, dump: Dump | None = No
         return result(None, {}, None)
     found = contents(typed.network, reporter)
     plan = None if reporter.failed else schedule(typed.network, found)
+    if plan is not None:
+        check_paths(typed, reporter)
     if dump is not None and plan is not None:
         from lnc.syntax.explicit import explicit
 

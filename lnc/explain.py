@@ -9,7 +9,7 @@ from lnc.diagnostics.codes import Page
 from lnc.diagnostics.format import printable
 from lnc.driver import Result, describe_paths
 from lnc.library import Library, Operator, Parameter
-from lnc.network import Node, ScheduledNode, TypedNetwork
+from lnc.network import Node, PathReport, ScheduledNode, TypedNetwork
 
 
 def print_page(page: Page) -> str:
@@ -52,7 +52,7 @@ def explain_json(result: Result) -> dict[str, object]:
         "wires": wires,
         "schedule": steps,
         "image_paths": paths.image,
-        "missing": None,
+        "missing": _missing(paths),
     }
 
 
@@ -80,12 +80,20 @@ def explain_text(result: Result) -> str:
         lines.append(f"  {_mode(node_at):8} {node_at.name} (line {node_at.line}{cycle})")
     if paths.image is not None:
         lines += ["", f"image: {paths.image}"]
+        lines += [f"lacks: {paths.lacking}" if paths.lacking else "lacks: nothing"]
     return "\n".join(lines) + "\n"
 
 
 def _compiled(result: Result) -> tuple[TypedNetwork, tuple[ScheduledNode, ...]]:
     assert result.typed is not None and result.schedule is not None
     return result.typed, result.schedule.nodes
+
+
+def _missing(paths: PathReport) -> dict[str, object] | None:
+    """A shortest path of all light that the picture lacks, as a witness."""
+    if paths.missing is None:
+        return None
+    return {"path": paths.missing, "count": 0, "expected": 1, "routes": []}
 
 
 def _mode(node: ScheduledNode) -> str:

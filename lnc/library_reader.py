@@ -137,10 +137,31 @@ class _OperatorReader:
             bias=sum(self._number(i.bound, "ratio") for i in body if isinstance(i, ast.BiasDeclaration)),
             converter=Converter(self._number(converter.cost, "number"), converter.loss) if converter else None,
             recursion=recursion.kind if recursion else None,
+            depth_parameter=self._depth_parameter(recursion, parameters),
+            equal=self._equal(body, ports),
             prepares=any(p.complete for p in ports) or any(isinstance(i, ast.PrepareDeclaration) for i in body),
             overloads=overloads.name if overloads else None,
             span=declaration.name_span,
         )
+
+    def _depth_parameter(
+        self, recursion: ast.RecursionDeclaration | None, parameters: tuple[Parameter, ...]
+    ) -> str | None:
+        if recursion is None or recursion.bound is None:
+            return None
+        if not any(p.name == recursion.bound and p.type == "count" for p in parameters):
+            self._error(recursion.span, f"'{recursion.bound}' is no count parameter of this operator")
+        return recursion.bound
+
+    def _equal(self, body: tuple[ast.OperatorItem, ...], ports: tuple[Port, ...]) -> tuple[str, ...]:
+        names: list[str] = []
+        for item in body:
+            if isinstance(item, ast.EqualDeclaration):
+                names += item.ports
+                unknown = [name for name in item.ports if name not in {p.name for p in ports}]
+                if unknown:
+                    self._error(item.span, f"'{unknown[0]}' is no port of this operator")
+        return tuple(names)
 
     def _parameter(self, item: ast.ParameterDeclaration) -> Parameter:
         if item.type not in PARAMETER_TYPES:

@@ -119,8 +119,9 @@ class Probe:
 
 @dataclass(frozen=True)
 class Expectation:
-    """`expect PATH`: the light paths that the picture is to contain."""
+    """`expect PATH`: the light paths that the picture, or a wire, is to contain, each once."""
 
+    wire: str | None  # None: the picture
     path: PathExpression
     at_most: bool
     span: Span = field(compare=False, repr=False)
@@ -160,10 +161,12 @@ class TypedNetwork:
 
 @dataclass(frozen=True)
 class PathReport:
-    """Light paths as readable expressions: per wire and content, and of the picture."""
+    """Light paths as readable expressions."""
 
     wires: dict[str, tuple[tuple[str, str], ...]]  # wire -> (content, expression)
-    image: str | None
+    image: str | None  # the picture's
+    lacking: str | None  # what of all light the picture lacks
+    missing: str | None  # a shortest path of those
 
 
 # --- Schedule: all that code generation needs -------------------------------------------------------------------------

@@ -75,7 +75,7 @@ def _parse_path(text: str, reporter: Reporter) -> ast.PathExpression | None:
     """The path of the statement `expect EXPR`, which messages show."""
     file = parse(SourceFile("--reference", f"expect {text}"), reporter)
     match file.statements:
-        case (ast.Expect(path, False),):
+        case (ast.Expect(None, path, False),):
             return path
     if not reporter.failed:
         reporter.error("LN0101", file.span, "a single light path is wanted, such as L (D|G|S)* E")

@@ -15,7 +15,7 @@ from lnc.cli import main
 
 ROOT = Path(__file__).parent.parent
 CAUSTICS = str(ROOT / "examples" / "caustics.ln")
-GOOD = "light = Lights()\nimage Direct(light)\n"
+GOOD = "light = Lights()\nexpect L S* E | L (D|G) S* E\nimage Direct(light)\n"
 BAD = "light = Lights()\nimage Direct(ligth)\n"
 
 
@@ -80,7 +80,7 @@ def test_explain_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert wires["caustic"]["representation"] == "Points" and wires["caustic"]["tags"] == []
     assert [step["name"] for step in found["schedule"]] == ["light", "direct", "photons", "photons_tree", "caustic"]
     assert found["image_paths"] == "L (G | S* D)? S* E"
-    assert found["missing"] is None
+    assert found["missing"] == {"path": "LDDE", "count": 0, "expected": 1, "routes": []}
 
 
 def test_explain_text_and_pages(capsys: pytest.CaptureFixture[str]) -> None:

@@ -23,7 +23,6 @@ from lnc.source import SourceFile
 
 ERRORS = Path(__file__).parent / "errors"
 NO_EXAMPLE = {"LN0100", "LN0112"}  # an unreadable file; a wrong declaration, in test_wrong_declarations
-PENDING = {"LN0301", "LN0302", "LN0303", "LN0304"}
 EXPECTED = re.compile(r"// (error|warning): (LN\d{4}): (.*?) *$")
 
 
@@ -41,13 +40,7 @@ def test_error(path: Path) -> None:
     assert path.name.startswith(tuple(d.code for d in result.diagnostics))
 
 
-def code_or_pending(code: str) -> object:
-    if code not in PENDING:
-        return code
-    return pytest.param(code, marks=pytest.mark.xfail(reason="the pass that counts light paths", strict=False))
-
-
-@pytest.mark.parametrize("code", [code_or_pending(code) for code in sorted(PAGES)])
+@pytest.mark.parametrize("code", sorted(PAGES))
 def test_every_page_has_an_example_that_provokes_it(code: str, library: Library, tmp_path: Path) -> None:
     page = PAGES[code]
     assert page.code == code and page.text.strip() and page.title
@@ -71,7 +64,7 @@ def test_every_page_has_an_example_that_provokes_it(code: str, library: Library,
 
 def test_every_code_is_provoked_by_a_file() -> None:
     provoked = {path.stem[:6] for path in ERRORS.glob("*.ln")}
-    assert set(PAGES) - provoked - PENDING == {*NO_EXAMPLE, "LN0501"}  # the last in test_scene_tags.py
+    assert set(PAGES) - provoked == {*NO_EXAMPLE, "LN0501"}  # the last in test_scene_tags.py
 
 
 def test_every_code_in_the_compiler_has_a_page() -> None:

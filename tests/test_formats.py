@@ -181,7 +181,8 @@ def test_github_on_the_command_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "bad.ln").write_text("light = Lights()\nspare = Direct(light)\nimage Direct(light)\n")
+    text = "light = Lights()\nspare = Direct(light)\nexpect <= L (D|G)? S* E\nimage Direct(light)\n"
+    (tmp_path / "bad.ln").write_text(text)
     assert main(["check", "--format", "github", "bad.ln"]) == 0
     command, summary = capsys.readouterr().out.splitlines()
     assert command == (

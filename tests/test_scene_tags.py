@@ -255,7 +255,8 @@ def test_check_with_a_scene(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "room.gltf", ROOM)
-    text = 'tag t = node "lam*"\ntag u = node "Lam"\nlight = Lights(from = t)\nimage Direct(light, to = u)\n'
+    text = 'tag t = node "lam*"\ntag u = node "Lam"\nlight = Lights(from = t)\n'
+    text += "expect <= L (D|G)? S* E\nimage Direct(light, to = u)\n"
     (tmp_path / "a.ln").write_text(text)
     assert main(["check", "a.ln"]) == 0
     assert main(["check", "a.ln", "--scene", "room.gltf", "--format", "json"]) == 1

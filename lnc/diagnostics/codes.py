@@ -100,7 +100,7 @@ twice. Parameters are always given by name.""",
         "LN0108",
         "unused wire",
         """Nothing uses this wire, so the program leaves it out. This is a warning.""",
-        "light = Lights()\nspare = Direct(light)\nimage Direct(light)\n",
+        "light = Lights()\nspare = Direct(light)\nexpect L S* E | L (D|G) S* E\nimage Direct(light)\n",
     ),
     Page(
         "LN0109",
@@ -195,6 +195,15 @@ directions, so a surface can scatter it by D alone. Samples come from directions
 choice: D and G, for S asks for one exact direction. Radiance can be scattered by all.""",
         "light   = Lights()\nphotons = ParticleTracer(light)\nsoft    = NNDensity(photons)\n"
         "image   PathTracer(soft, via = S)\n",
+    ),
+    Page(
+        "LN0307",
+        "light paths that must be equal",
+        """An operator that weights several estimates of the same light, as mis(a, b) does, needs wires that
+carry the same light paths, each as often and with the same content. The path in the message is a
+shortest one that they count differently.""",
+        "light  = Lights()\ndirect = Direct(light)\nbounce = PathTracer(direct)\n"
+        "expect <= L (D|G|S)* E\nimage  mis(direct, bounce)\n",
     ),
     Page(
         "LN0401",

@@ -101,9 +101,8 @@ class _Resolver:
                     terms = self._wire(wire, _Home("tap", statement.span))
                     self._check_file("a tap writes OpenEXR files (.exr)", ".exr", path, statement.file_span)
                     taps.append(Tap(terms or (), path, statement.span))
-                case ast.Expect(path, at_most):
-                    report_unknown_tags(path, self.tags, self.reporter, self.broken)
-                    expectations.append(Expectation(path, at_most, statement.span))
+                case ast.Expect():
+                    expectations += self._expectation(statement)
                 case ast.ProbeStatement(wire, sensors, path):
                     terms = self._wire(wire, _Home("probe", statement.span))
                     self._check_file("a probe reads sensors from a table (.csv)", ".csv", sensors, statement.span)
@@ -145,6 +144,16 @@ class _Resolver:
             if path in first:
                 self._twice(span, f"two results are written to the file {quote(path)}", first[path])
             first.setdefault(path, span)
+
+    def _expectation(self, statement: ast.Expect) -> list[Expectation]:
+        report_unknown_tags(statement.path, self.tags, self.reporter, self.broken)
+        wire = statement.wire
+        if wire is not None and statement.wire_span is not None:
+            terms = self._wire_name(ast.WireName(wire, statement.wire_span))
+            if not terms:
+                return []
+            wire = terms[0].node
+        return [Expectation(wire, statement.path, statement.at_most, statement.span)]
 
     # --- Definitions --------------------------------------------------------------------------------------------------
 

@@ -33,6 +33,8 @@ def _alphabet(network: Network, reporter: Reporter) -> Alphabet:
                 used.add(parameter.value)
             elif isinstance(parameter.value, PathValue):
                 used |= tags_in(parameter.value.expression)
+    for expectation in network.expectations:
+        used |= tags_in(expectation.path)
     known = [tag for tag in network.tags if tag.name in used]
     if len(known) > TAG_LIMIT:
         message = f"the network tells {len(known)} tags apart, which makes more than {1 << TAG_LIMIT} combinations"

@@ -7,7 +7,7 @@ tag combinations.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 STATE_LIMIT = 4096
@@ -51,6 +51,19 @@ class Dfa:
     @property
     def is_empty(self) -> bool:
         return not any(self.accepting)
+
+    def shortest_word(self) -> list[int]:
+        """A shortest word as sets of letters; the language must not be empty."""
+        queue: list[tuple[int, list[int]]] = [(0, [])]
+        seen = {0}
+        for state, word in queue:
+            if self.accepting[state]:
+                return word
+            for letters, target in self.edges[state]:
+                if target not in seen:
+                    seen.add(target)
+                    queue.append((target, [*word, letters]))
+        raise ValueError("the language is empty")
 
     def length_bounds(self) -> tuple[int, int | None]:
         """The shortest and the longest number of letters in a word; None is unbounded."""
@@ -120,6 +133,44 @@ def determinise(nfa: Nfa, limit: int = STATE_LIMIT) -> Dfa:
         rows.append(row)
     accepting = [any(s in nfa.accepting for s in subset) for subset in queue]
     return _minimise(rows, accepting, blocks)
+
+
+def union(a: Dfa, b: Dfa) -> Dfa:
+    """The words of either. Raises TooLarge."""
+    return _combined(a, b, lambda in_a, in_b: in_a or in_b)
+
+
+def intersection(a: Dfa, b: Dfa, negated: bool = False) -> Dfa:
+    """The words of both; with `negated`, those of `a` that are not in `b`. Raises TooLarge."""
+    return _combined(a, b, lambda in_a, in_b: in_a and in_b != negated)
+
+
+def _combined(a: Dfa, b: Dfa, accepts: Callable[[bool, bool], bool]) -> Dfa:
+    """The product automaton; state -1 of either is its dead end."""
+    blocks = letter_blocks(letters for dfa in (a, b) for row in dfa.edges for letters, _ in row)
+    index: dict[tuple[int, int], int] = {(0, 0): 0}
+    queue = [(0, 0)]
+    rows: list[list[int]] = []
+    for pair in queue:
+        row: list[int] = []
+        for block in blocks:
+            target = (_target(a, pair[0], block), _target(b, pair[1], block))
+            if target == (-1, -1):
+                row.append(-1)
+                continue
+            if target not in index:
+                if len(index) >= STATE_LIMIT:
+                    raise TooLarge
+                index[target] = len(queue)
+                queue.append(target)
+            row.append(index[target])
+        rows.append(row)
+    accepting = [accepts(p >= 0 and a.accepting[p], q >= 0 and b.accepting[q]) for p, q in queue]
+    return _minimise(rows, accepting, blocks)
+
+
+def _target(dfa: Dfa, state: int, block: int) -> int:
+    return next((t for letters, t in dfa.edges[state] if letters & block), -1) if state >= 0 else -1
 
 
 def letter_blocks(masks: Iterable[int]) -> list[int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lnc.paths.automaton import STATE_LIMIT, Dfa, EventTable, Nfa, TooLarge, determinise
+from lnc.source import SourceFile, Span
 from lnc.syntax import ast
 
 EVENTS = "DGS"
@@ -60,6 +61,25 @@ class Alphabet:
 
     def _where(self, tag: ast.TagRef | None) -> int:
         return self.combinations_with(None) if tag is None else self.combinations_with(tag.name, tag.negated)
+
+
+_NOWHERE = Span(SourceFile("", ""), 0, 0)
+
+
+def _events(letters: str, tag: str | None = None) -> ast.PathEvents:
+    return ast.PathEvents(letters, ast.TagRef(tag, False, _NOWHERE) if tag else None, _NOWHERE)
+
+
+def _any_number(letters: str) -> ast.PathRepeat:
+    return ast.PathRepeat(_events(letters), 0, None, _NOWHERE)
+
+
+ALL_LIGHT: ast.PathExpression = ast.PathConcat((_events("L"), _any_number("DGS"), _events("E")), _NOWHERE)
+"""L (D|G|S)* E"""
+ALL_ARRIVING: ast.PathExpression = ast.PathConcat((_events("L"), _any_number("DGS")), _NOWHERE)
+"""L (D|G|S)*"""
+DARK: ast.PathExpression = ast.PathConcat((_events("L", "delta"), _any_number("S"), _events("E")), _NOWHERE)
+"""L@delta S* E, which carries no light"""
 
 
 def tags_in(path: ast.PathExpression) -> set[str]:

@@ -211,10 +211,14 @@ class Equation(Record):
 
 
 class Expect(Record):
+    """`expect PATH`, `expect <= PATH`, `expect wire: PATH`."""
+
+    wire: str | None
     path: PathExpression
     at_most: bool
     comments: Comments
     span: Span
+    wire_span: Span | None
 
 
 class ImageStatement(Record):
@@ -327,7 +331,18 @@ class ConverterDeclaration(Record):
 
 
 class RecursionDeclaration(Record):
+    """`recursion roulette max_depth`: how a recursion ends, and the count that may cut it."""
+
     kind: str
+    bound: str | None
+    comments: Comments
+    span: Span
+
+
+class EqualDeclaration(Record):
+    """`equal a, b`: these ports must carry the same light paths."""
+
+    ports: tuple[str, ...]
     comments: Comments
     span: Span
 
@@ -349,6 +364,7 @@ OperatorItem = (
     | BiasDeclaration
     | ConverterDeclaration
     | RecursionDeclaration
+    | EqualDeclaration
     | PrepareDeclaration
     | OverloadsDeclaration
 )

@@ -98,7 +98,13 @@ class Builder:
         return ast.Equation(name.text, representation, wire, self._comments(span), span, self._span(name))
 
     def expect(self, span: Span, children: Children) -> ast.Expect:
-        return ast.Expect(children[-1], len(children) > 1, self._comments(span), span)
+        wire = next((c for c in children[:-1] if isinstance(c, ast.WireName)), None)
+        at_most = any(isinstance(c, Token) for c in children[:-1])
+        name, where = (wire.name, wire.span) if wire else (None, None)
+        return ast.Expect(name, children[-1], at_most, self._comments(span), span, where)
+
+    def expected_wire(self, span: Span, children: Children) -> ast.WireName:
+        return ast.WireName(children[0].text, self._span(children[0]))
 
     def image(self, span: Span, children: Children) -> ast.ImageStatement:
         return ast.ImageStatement(children[0], len(children) > 1, self._comments(span), span)
@@ -331,7 +337,11 @@ class Builder:
         return ast.ConverterDeclaration(cost, loss, self._comments(span), span)
 
     def recursion(self, span: Span, children: Children) -> ast.RecursionDeclaration:
-        return ast.RecursionDeclaration(children[0].text, self._comments(span), span)
+        bound = children[1].text if len(children) > 1 else None
+        return ast.RecursionDeclaration(children[0].text, bound, self._comments(span), span)
+
+    def equal(self, span: Span, children: Children) -> ast.EqualDeclaration:
+        return ast.EqualDeclaration(tuple(c.text for c in children), self._comments(span), span)
 
     def prepare(self, span: Span, children: Children) -> ast.PrepareDeclaration:
         return ast.PrepareDeclaration(self._comments(span), span)

@@ -28,7 +28,7 @@ STATEMENT_WORDS = (
     "operator",
     "representation",
 )
-ITEM_WORDS = ("paths", "bias", "converter", "recursion", "prepare", "overloads")
+ITEM_WORDS = ("paths", "bias", "converter", "recursion", "equal", "prepare", "overloads")
 
 
 def parse(source: SourceFile, reporter: Reporter) -> File:

@@ -74,8 +74,9 @@ def _statement(statement: ast.Statement | ast.OperatorItem) -> tuple[str, str, s
             return f"tag {name}", f"= {alternatives}" if globs else "", "tag", ()
         case ast.Equation():
             return _equation(statement)
-        case ast.Expect(path, at_most):
-            return "expect", ("<= " if at_most else "") + print_path(path), "result", ()
+        case ast.Expect(wire, path, at_most):
+            body = ("<= " if at_most else "") + print_path(path)
+            return ("expect", body, "result", ()) if wire is None else (f"expect {wire}:", body, "result", ())
         case ast.ImageStatement(wire, layers):
             return "image", print_wire(wire) + (" layers" if layers else ""), "result", ()
         case ast.TapStatement(wire, file):
@@ -147,8 +148,10 @@ def _item(item: ast.Statement | ast.OperatorItem) -> tuple[str, str, str, tuple[
             return "bias", bound.text, "", ()
         case ast.ConverterDeclaration(cost, loss):
             return "converter", f"cost {cost.text}" + (f" loss {_text(loss)}" if loss else ""), "", ()
-        case ast.RecursionDeclaration(kind):
-            return "recursion", kind, "", ()
+        case ast.RecursionDeclaration(kind, bound):
+            return "recursion", kind if bound is None else f"{kind} {bound}", "", ()
+        case ast.EqualDeclaration(ports):
+            return "equal", ", ".join(ports), "", ()
         case ast.PrepareDeclaration():
             return "prepare", "", "", ()
         case ast.OverloadsDeclaration(name):

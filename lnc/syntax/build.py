@@ -36,7 +36,7 @@ class Builder:
     def _comments(self, span: Span) -> ast.Comments:
         leading, blank = self.tokens.leading(span.start)
         inside = [c.text for c in self.tokens.between(span.start, span.end)]
-        return ast.Comments((*leading, *inside), self.tokens.trailing(span.end), blank)
+        return ast.Comments(_moved_ahead(leading, inside), self.tokens.trailing(span.end), blank)
 
     def _block_comments(self, span: Span, head: Span, ports: tuple[ast.PortDeclaration, ...]) -> ast.Comments:
         """As `_comments`, but what stands inside the braces belongs to the statements there."""
@@ -46,7 +46,8 @@ class Builder:
         inside = [text for text in inside if text not in docs]
         brace = self.source.text.index("{", head.end)
         behind = self.tokens.trailing(brace + 1)
-        return ast.Comments((*leading, *inside, *([behind] if behind else [])), self.tokens.trailing(span.end), blank)
+        inside += [behind] if behind else []
+        return ast.Comments(_moved_ahead(leading, inside), self.tokens.trailing(span.end), blank)
 
     def _doc(self, start: int) -> str:
         """The `///` lines directly before a token, without the slashes."""
@@ -367,6 +368,17 @@ def _with_tag(item: ast.PathExpression, tag: ast.TagRef, span: Span) -> ast.Path
     if isinstance(item, ast.PathName) and item.tag is None:
         return ast.PathName(item.name, tag, span)
     return ast.PathTagged(item, tag, span)
+
+
+def _moved_ahead(leading: list[str], inside: list[str]) -> tuple[str, ...]:
+    """The comments before a statement and those from inside of it, which become no part of its documentation."""
+    if not inside:
+        return tuple(leading)
+    documented = len(leading)
+    while documented > 0 and leading[documented - 1].startswith("///"):
+        documented -= 1
+    plain = [f"//{text.lstrip('/')}" if text.startswith("///") else text for text in inside]
+    return (*leading[:documented], *plain, *leading[documented:])
 
 
 def _doc_lines(doc: str) -> list[str]:

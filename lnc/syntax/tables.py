@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 from lnc.locations import cached, compiler_fingerprint, grammar_file
 
@@ -31,8 +32,9 @@ class Tables:
     spelling: dict[str, str]  # terminal -> how messages write it
 
 
+@cache
 def load_tables() -> Tables:
-    """The tables of `grammar/network.lark`."""
+    """The tables of `grammar/network.lark`, read once in a process."""
     return cached("grammar", compiler_fingerprint(), lambda: build_tables(grammar_file().read_text("utf-8")))
 
 

@@ -134,7 +134,8 @@ def compile_or_report(path: str, ops: list[str]) -> tuple[Result | None, int]:
 
 def _check(arguments: argparse.Namespace) -> int:
     from lnc.diagnostics import Reporter, unreadable
-    from lnc.driver import Unreadable, compile_file
+    from lnc.driver import Unreadable, compile_network, read_source
+    from lnc.library_reader import load_library
 
     status = FINE
     found: list[Diagnostic] = []
@@ -146,9 +147,13 @@ def _check(arguments: argparse.Namespace) -> int:
             names = read_scene_names(arguments.scene)
         except UnreadableScene as error:
             return fail(str(error))
+    library, faults = load_library(tuple(arguments.ops))
+    if faults:
+        _print_found(faults, arguments.format, 0)
+        return WRONG
     for path in arguments.files:
         try:
-            result = compile_file(path, tuple(arguments.ops))
+            result = compile_network(read_source(path), library)
         except Unreadable as error:
             status = USAGE
             found.append(unreadable(path, str(error)))

@@ -164,9 +164,12 @@ def _check_inserted(typed: TypedNetwork, reporter: Reporter) -> None:
 
 
 def _read_used(name: str, source: SourceFile) -> SourceFile:
-    """The file of a `use`, relative to the file it stands in."""
+    """The file of a `use`, relative to the file it stands in. Opening a pipe or a device might wait for ever."""
+    path = Path(source.name).parent / name
     try:
-        return read_source(str(Path(source.name).parent / name))
+        if path.exists() and not path.is_file():
+            raise OSError("is not a regular file")
+        return read_source(str(path))
     except Unreadable as error:
         raise OSError(str(error)) from error
 

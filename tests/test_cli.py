@@ -37,6 +37,14 @@ def test_check_status(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "bad.ln:2:14" in output.err and "did you mean 'light'?" in output.err
 
 
+def test_a_pipe_is_not_used(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nobody writes into it, so reading it would never end."""
+    os.mkfifo(folder / "pipe.ln")
+    (folder / "use.ln").write_text('use "pipe.ln"\n' + GOOD)
+    assert main(["check", "use.ln"]) == 1
+    assert "'pipe.ln' cannot be used: is not a regular file" in capsys.readouterr().err
+
+
 def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
     for arguments in ([], ["chek"], ["check"], ["check", "--format", "xml", CAUSTICS], ["check", CAUSTICS, "--nope"]):
         try:

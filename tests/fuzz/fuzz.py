@@ -2,9 +2,9 @@
 
     python tests/fuzz/fuzz.py [FOLDER] [-max_total_time=600] [libFuzzer options]
 
-Texts that reach new code are kept in FOLDER (build/fuzz by default), with the repository's networks as a start. What raises,
-or takes more than 5 s, ends the run with `crash-...` in the current folder; put it into tests/fuzz/corpus, where
-test_corpus.py replays it, and mend the fault.
+Texts that reach new code are kept in FOLDER (build/fuzz by default), with the repository's networks as a start. What
+raises, or takes more than 5 s, ends the run with a file `crash-...` in the current folder. Mend the fault, and put the
+file into tests/fuzz/corpus, where test_corpus.py replays it.
 """
 
 from __future__ import annotations

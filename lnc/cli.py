@@ -56,6 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     check.add_argument("files", nargs="+", metavar="FILE")
     check.add_argument("--format", choices=("human", "json", "sarif", "github"), default="human")
     check.add_argument("--scene", metavar="SCENE", help="a glTF file: are there tags that match nothing in it?")
+    check.add_argument("--exact", action="store_true", help="decide about light paths in rational numbers")
     check.set_defaults(run=_check)
 
     explain = commands.add_parser(
@@ -153,7 +154,7 @@ def _check(arguments: argparse.Namespace) -> int:
         return WRONG
     for path in arguments.files:
         try:
-            result = compile_network(read_source(path), library)
+            result = compile_network(read_source(path), library, exact=arguments.exact)
         except Unreadable as error:
             status = USAGE
             found.append(unreadable(path, str(error)))

@@ -94,7 +94,7 @@ def write_text(path: str, text: str) -> None:
         raise Unreadable(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from error
 
 
-def compile_network(source: SourceFile, library: Library, dump: Dump | None = None) -> Result:
+def compile_network(source: SourceFile, library: Library, dump: Dump | None = None, exact: bool = False) -> Result:
     """All passes over one text; each works only if those before it found no error."""
     reporter = Reporter()
     file = parse(source, reporter)
@@ -120,7 +120,7 @@ def compile_network(source: SourceFile, library: Library, dump: Dump | None = No
     found = contents(typed.network, reporter)
     plan = None if reporter.failed else schedule(typed.network, found)
     if plan is not None:
-        check_paths(typed, reporter)
+        check_paths(typed, reporter, exact)
     if dump is not None and plan is not None:
         from lnc.syntax.explicit import explicit
 

@@ -43,10 +43,10 @@ ROUTE_LIMIT = 4
 SPELLING_LIMIT = 256  # words that may be counted to shorten the letters of one
 
 
-def check_paths(typed: TypedNetwork, reporter: Reporter) -> None:
-    """Report what is wrong with the light paths of each result."""
+def check_paths(typed: TypedNetwork, reporter: Reporter, exact: bool = False) -> None:
+    """Report what is wrong with the light paths of each result. `exact`: decide in rationals, not in a prime field."""
     with suppress(SilentCycle):  # which has been reported
-        _Checker(typed, reporter).run()
+        _Checker(typed, reporter, exact).run()
 
 
 @dataclass(frozen=True)
@@ -61,13 +61,13 @@ class _Target:
 
 
 class _Checker:
-    def __init__(self, typed: TypedNetwork, reporter: Reporter) -> None:
+    def __init__(self, typed: TypedNetwork, reporter: Reporter, exact: bool) -> None:
         self.network = typed.network
         self.reporter = reporter
         self.alphabet = typed.alphabet
         self.automaton = PathAutomaton(typed.network, typed.alphabet)
         self.renderer = Renderer(typed.alphabet)
-        self.broken = False
+        self.exact = exact
 
     def run(self) -> None:
         network, automaton = self.network, self.automaton
@@ -108,7 +108,7 @@ class _Checker:
         counts = self._weighted(target.accepting, blocks)
         expected = weighted_dfa(wanted, blocks)
         at_most = expectation.at_most if expectation else target.beside
-        if not at_most and first_difference(counts, expected) is None:
+        if not at_most and first_difference(counts, expected, self.exact) is None:
             return
         kinds = ("often", "negative") if at_most else tuple(CODES)
         for fault in find_faults(counts, expected, kinds):
@@ -340,7 +340,7 @@ class _Checker:
                     ends.append({end})
                 blocks = common_blocks([graph.edges])
                 a, b = (self._weighted(end, blocks) for end in ends)
-                word = first_difference(a, b)
+                word = first_difference(a, b, self.exact)
                 if word is not None:
                     self._report_unequal(node, (first.span, other.span), content, word, a, b)
                     break

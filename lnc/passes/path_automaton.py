@@ -118,11 +118,12 @@ class PathAutomaton:
 
     def language(self, accepting: Iterable[int]) -> Dfa:
         """The set of words with a run of weight other than 0. Raises TooLarge."""
-        graph = self.graph
-        useful = graph.reachable()
-        silent = [[s.target for s in row if s.weight] if i in useful else [] for i, row in enumerate(graph.silent)]
-        edges = [row if i in useful else [] for i, row in enumerate(graph.edges)]
-        return determinise(Nfa(edges, silent, set(accepting)))
+        graph, ends = self.graph, set(accepting)
+        useful = sorted(graph.co_reachable(ends) | {0})
+        number = {state: i for i, state in enumerate(useful)}
+        edges = [[(letters, number[t]) for letters, t in graph.edges[s] if t in number] for s in useful]
+        silent = [[number[e.target] for e in graph.silent[s] if e.weight and e.target in number] for s in useful]
+        return determinise(Nfa(edges, silent, {number[s] for s in ends}))
 
     # --- Growing ------------------------------------------------------------------------------------------------------
 

@@ -58,18 +58,22 @@ class Graph(Generic[Mark]):
 
     edges: list[list[tuple[int, int]]] = field(default_factory=lambda: [[]])  # state -> (letters, target)
     silent: list[list[Silent[Mark]]] = field(default_factory=lambda: [[]])
+    sources: list[list[int]] = field(default_factory=lambda: [[]])  # state -> states with an edge to it
 
     def state(self) -> int:
         self.edges.append([])
         self.silent.append([])
+        self.sources.append([])
         return len(self.edges) - 1
 
     def edge(self, source: int, letters: int, target: int) -> None:
         if letters:
             self.edges[source].append((letters, target))
+            self.sources[target].append(source)
 
     def skip(self, source: int, target: int, weight: int = 1, mark: Mark | None = None) -> None:
         self.silent[source].append(Silent(target, weight, mark))
+        self.sources[target].append(source)
 
     def targets(self, state: int) -> list[int]:
         return [t for _, t in self.edges[state]] + [s.target for s in self.silent[state]]
@@ -86,14 +90,10 @@ class Graph(Generic[Mark]):
 
     def co_reachable(self, accepting: Iterable[int]) -> set[int]:
         """States that lead to an accepting one."""
-        back: list[list[int]] = [[] for _ in self.edges]
-        for state in range(len(self.edges)):
-            for target in self.targets(state):
-                back[target].append(state)
         seen = set(accepting)
         stack = list(seen)
         while stack:
-            for source in back[stack.pop()]:
+            for source in self.sources[stack.pop()]:
                 if source not in seen:
                     seen.add(source)
                     stack.append(source)

@@ -11,6 +11,8 @@ from lnc.syntax.ast import PathExpression
 CONTENTS = ("emission", "irradiance", "samples", "radiance")
 SCATTERED = {"emission": "DGS", "irradiance": "D", "samples": "DG", "radiance": "DGS"}
 PARAMETER_TYPES = ("count", "ratio", "length", "angle", "time", "number", "flag", "choice", "path", "tags", "text")
+POINTS = "Points"
+"""The representation that sums and most results are made of."""
 
 Scalar = int | float | bool | str
 """A parameter's value in SI units: metres, radians, seconds; a ratio is a fraction of 1."""
@@ -18,9 +20,10 @@ Scalar = int | float | bool | str
 
 @dataclass(frozen=True)
 class Representation:
-    """How illumination is stored on a wire."""
+    """How illumination is stored on a wire. `taps`: the suffixes of the files that a tap can write it as."""
 
     name: str
+    taps: tuple[str, ...]
     doc: str
     span: Span = field(compare=False, repr=False)
 

@@ -56,8 +56,8 @@ def read_library(texts: dict[str, str]) -> tuple[Library, list[Diagnostic]]:
         file = parse(SourceFile(path, text.replace("\r\n", "\n")), reporter)
         for statement in file.statements:
             match statement:
-                case ast.RepresentationDeclaration(name, doc):
-                    representations[name] = Representation(name, doc, statement.span)
+                case ast.RepresentationDeclaration(name, taps, doc):
+                    representations[name] = Representation(name, taps, doc, statement.span)
                 case ast.OperatorDeclaration():
                     declared.append((Path(path), statement))
                 case _:

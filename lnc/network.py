@@ -105,6 +105,7 @@ class Tap:
     terms: tuple[Term, ...]
     file: str
     span: Span = field(compare=False, repr=False)
+    file_span: Span = field(compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -217,6 +218,7 @@ class ScheduledNode:
 class Schedule:
     """A network in the order in which it is built, prepared and pulled.
 
+    `taps`: those of Points, which are pictures through the camera; `stored_taps`: of what is stored otherwise.
     `nodes`: every node that a result needs, sources first (nodes of one pull cycle stand together, in the order of
     the text). `prepare`: names of the nodes to prepare, in order. `cycles`: the pull cycles, as names.
     """
@@ -228,6 +230,7 @@ class Schedule:
     cycles: tuple[tuple[str, ...], ...]
     image: Image | None
     taps: tuple[Tap, ...]
+    stored_taps: tuple[Tap, ...]
     probes: tuple[Probe, ...]
     tags: tuple[Tag, ...]
 

@@ -7,7 +7,22 @@ from collections.abc import Iterable
 
 # Members of the generated struct, and names that its functions use.
 RESERVED = frozenset(
-    {"Network", "image", "prepare", "probes", "request", "next", "step", "context", "ln", "main", "std", "value"}
+    {
+        "Network",
+        "image",
+        "prepare",
+        "probes",
+        "request",
+        "write",
+        "write_taps",
+        "next",
+        "step",
+        "context",
+        "ln",
+        "main",
+        "std",
+        "value",
+    }
 )
 
 

@@ -8,10 +8,8 @@ from pathlib import Path, PurePath
 from lnc.codegen.languages import TagRuleView, tag_rules
 from lnc.codegen.names import cpp_string, float_literal, unique_names
 from lnc.diagnostics import InternalError
-from lnc.library import snake_case
-from lnc.network import ParameterValue, PathValue, Probe, Schedule, ScheduledInput, ScheduledNode, Term
-
-POINTS = "Points"
+from lnc.library import POINTS, snake_case
+from lnc.network import ParameterValue, PathValue, Probe, Schedule, ScheduledInput, ScheduledNode, Tap, Term
 
 
 @dataclass(frozen=True)
@@ -108,6 +106,16 @@ class ProbeView:
 
 
 @dataclass(frozen=True)
+class StoredTapView:
+    """A wire that is written as it is stored."""
+
+    accessor: str
+    wire: str
+    light_paths: str
+    file: str
+
+
+@dataclass(frozen=True)
 class ProgramView:
     network: str
     file: str
@@ -120,6 +128,7 @@ class ProgramView:
     layers: tuple[LayerView, ...]
     emitters_layer: int  # the layer of the emitters that are seen; -1: there is none
     subtracts: bool
+    stored_taps: tuple[StoredTapView, ...]
     probes: tuple[ProbeView, ...]
     has_image: bool
     slots: tuple[SlotView, ...]
@@ -168,6 +177,7 @@ class _Builder:
             layers=tuple(self.layers),
             emitters_layer=emitters_layer,
             subtracts=any(t.weight < 0 for terms in self.all_terms() for t in terms),
+            stored_taps=tuple(self.stored_tap(tap) for tap in self.schedule.stored_taps),
             probes=tuple(self.probe(i, probe) for i, probe in enumerate(self.schedule.probes)),
             has_image=self.schedule.image is not None,
             slots=tuple(slot for n in self.schedule.nodes for slot in self.slots(n)),
@@ -247,8 +257,12 @@ class _Builder:
             return [InputView(terms, "", functor)]
         if len(i.terms) != 1 or i.terms[0].weight != 1:
             raise InternalError(f"a sum of {i.port.representation} at port {i.port.name}")
-        source = self.by_name[i.terms[0].node]
-        return [InputView((), f"{self.members[source.identifier]}.{snake_case(i.port.representation)}()")]
+        return [InputView((), self.accessor(i.terms[0].node))]
+
+    def accessor(self, wire: str) -> str:
+        """What is stored on a wire that is not Points."""
+        source = self.by_name[wire]
+        return f"{self.members[source.identifier]}.{snake_case(source.op.output)}()"
 
     def terms(self, terms: tuple[Term, ...]) -> tuple[TermView, ...]:
         return tuple(
@@ -311,6 +325,10 @@ class _Builder:
         sums = [i.terms for n in self.schedule.nodes for i in n.inputs] + [tap.terms for tap in self.schedule.taps]
         sums += [probe.terms for probe in self.schedule.probes]
         return sums + ([self.schedule.image.terms] if self.schedule.image else [])
+
+    def stored_tap(self, tap: Tap) -> StoredTapView:
+        wire = tap.terms[0].node
+        return StoredTapView(self.accessor(wire), wire, self.seen_paths[wire], tap.file)
 
     def probe(self, number: int, probe: Probe) -> ProbeView:
         return ProbeView(

@@ -6,18 +6,20 @@
 
 On entry: a typed network. On exit: every port reads wires of its own representation; several wires only as Points.
 Inserted nodes take their parameters' defaults, say why they are there, and are shared by all ports that need them.
+A tap takes what its file can hold: the wire as it is stored, or Points.
 No chain is LN0201; two cheapest chains are LN0202, never a silent choice.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import PurePath
 
 from lnc.conversions import cheapest_chains
-from lnc.diagnostics import Related, Reporter
-from lnc.library import Library, Operator, snake_case
+from lnc.diagnostics import Related, Reporter, quote
+from lnc.library import POINTS, Library, Operator, snake_case
 from lnc.naming import Names
-from lnc.network import Input, Node, ParameterValue, Term, TypedNetwork
+from lnc.network import Input, Node, ParameterValue, Tap, Term, TypedNetwork
 from lnc.passes.parameters import parameter_value
 from lnc.source import Span
 
@@ -49,13 +51,32 @@ class _Inserter:
         image = network.image
         if image is not None:
             image = replace(image, terms=self._result(image.terms, "image", image.span))
-        taps = tuple(replace(tap, terms=self._result(tap.terms, "tap", tap.span)) for tap in network.taps)
+        taps = tuple(self._tap(tap) for tap in network.taps)
         probes = tuple(replace(probe, terms=self._result(probe.terms, "probe", probe.span)) for probe in network.probes)
         network = replace(network, nodes=tuple(self.nodes), image=image, taps=taps, probes=probes)
         return replace(self.typed, network=network, representations=self.representations)
 
+    def _tap(self, tap: Tap) -> Tap:
+        """The tap of a wire as it is stored, where that can be written as such a file; otherwise of Points."""
+        suffix = PurePath(tap.file).suffix.lower()
+        whole = len(tap.terms) == 1 and tap.terms[0].weight == 1
+        found = self.representations.get(tap.terms[0].node, POINTS) if whole else POINTS
+        formats = self.library.representations[found].taps
+        points = self.library.representations[POINTS].taps
+        if suffix in formats:
+            return tap
+        if found != POINTS and cheapest_chains(self.library, found, POINTS):
+            formats += points
+        if suffix not in formats or "\0" in tap.file:
+            what = f"'{tap.terms[0].node}' is {found}" if whole else f"a sum is made of {POINTS}"
+            known = f"which a tap writes as {' or '.join(formats)}, not as {quote(tap.file)}"
+            message = f"{what}, {known if formats else 'which no tap can write'}"
+            self.reporter.error("LN0104", tap.file_span, message)
+            return tap
+        return replace(tap, terms=self._result(tap.terms, "tap", tap.span))
+
     def _result(self, terms: tuple[Term, ...], name: str, span: Span) -> tuple[Term, ...]:
-        return tuple(self._convert(term, "Points", f"'{name}' takes Points", name, span, None) for term in terms)
+        return tuple(self._convert(term, POINTS, f"'{name}' takes {POINTS}", name, span, None) for term in terms)
 
     def _terms(
         self, terms: tuple[Term, ...], wanted: str, place: str, given: Input, consumer: Node
@@ -64,11 +85,11 @@ class _Inserter:
         reason = f"'{place}' takes {wanted}"
         if len(terms) == 1:
             return (self._convert(terms[0], wanted, reason, consumer.name, consumer.statement, declared),)
-        reason_points = "a sum is made of Points" + ("" if wanted == "Points" else f", and {reason}")
+        reason_points = f"a sum is made of {POINTS}" + ("" if wanted == POINTS else f", and {reason}")
         terms = tuple(
-            self._convert(term, "Points", reason_points, consumer.name, consumer.statement, declared) for term in terms
+            self._convert(term, POINTS, reason_points, consumer.name, consumer.statement, declared) for term in terms
         )
-        if wanted == "Points" or any(self.representations.get(t.node) != "Points" for t in terms):
+        if wanted == POINTS or any(self.representations.get(t.node) != POINTS for t in terms):
             return terms
         total = Term(self._sum(terms, reason, consumer, given.span), 1.0, given.span)
         return (self._convert(total, wanted, reason, consumer.name, consumer.statement, declared),)
@@ -95,7 +116,7 @@ class _Inserter:
         return replace(term, node=name)
 
     def _sum(self, terms: tuple[Term, ...], reason: str, consumer: Node, span: Span) -> str:
-        key = (tuple((t.node, t.weight) for t in terms), "Points")
+        key = (tuple((t.node, t.weight) for t in terms), POINTS)
         if key not in self.shared:
             op = self.library.operators["Sum"]
             source = Input(op.ports[0], terms, span)

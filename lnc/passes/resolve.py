@@ -99,8 +99,7 @@ class _Resolver:
                         image = Image(terms or (), layers, statement.span)
                 case ast.TapStatement(wire, path):
                     terms = self._wire(wire, _Home("tap", statement.span))
-                    self._check_file("a tap writes OpenEXR files (.exr)", ".exr", path, statement.file_span)
-                    taps.append(Tap(terms or (), path, statement.span))
+                    taps.append(Tap(terms or (), path, statement.span, statement.file_span))
                 case ast.Expect():
                     expectations += self._expectation(statement)
                 case ast.ProbeStatement(wire, sensors, path):

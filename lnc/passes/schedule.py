@@ -9,7 +9,8 @@ Nodes that no result needs are left out.
 from __future__ import annotations
 
 from lnc.graph import strong_components
-from lnc.network import Network, Node, Schedule, ScheduledInput, ScheduledNode, Term
+from lnc.library import POINTS
+from lnc.network import Network, Node, Schedule, ScheduledInput, ScheduledNode, Tap, Term
 from lnc.passes.check_cycles import wire_sources
 from lnc.source import Span
 
@@ -47,7 +48,8 @@ def schedule(network: Network, contents: dict[str, tuple[str, ...]]) -> Schedule
         prepare=tuple(n.name for n in scheduled if n.prepares),
         cycles=cycles,
         image=network.image,
-        taps=network.taps,
+        taps=tuple(tap for tap in network.taps if _is_picture(tap, nodes)),
+        stored_taps=tuple(tap for tap in network.taps if not _is_picture(tap, nodes)),
         probes=network.probes,
         tags=network.tags,
     )
@@ -63,6 +65,10 @@ def _live(network: Network, nodes: dict[str, Node]) -> list[str]:
             live.add(name)
             stack += wire_sources(nodes[name])
     return [node.name for node in network.nodes if node.name in live]
+
+
+def _is_picture(tap: Tap, nodes: dict[str, Node]) -> bool:
+    return all(nodes[term.node].op.output == POINTS for term in tap.terms)
 
 
 def _scheduled(
@@ -134,6 +140,7 @@ def print_schedule(plan: Schedule) -> str:
     if plan.image is not None:
         lines.append(f"image {_terms_text(plan.image.terms)}" + (" layers" if plan.image.layers else ""))
     lines += [f"tap {_terms_text(tap.terms)} -> {tap.file!r}" for tap in plan.taps]
+    lines += [f"tap {_terms_text(tap.terms)} -> {tap.file!r} [stored]" for tap in plan.stored_taps]
     lines += [f"probe {_terms_text(probe.terms)} at {probe.sensors!r} -> {probe.file!r}" for probe in plan.probes]
     return "\n".join(lines) + "\n"
 

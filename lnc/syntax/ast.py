@@ -284,6 +284,7 @@ class Macro(Record):
 
 class RepresentationDeclaration(Record):
     name: str
+    taps: tuple[str, ...]
     doc: str
     comments: Comments
     span: Span

@@ -273,7 +273,9 @@ class Builder:
     # --- Declarations -------------------------------------------------------------------------------------------------
 
     def representation(self, span: Span, children: Children) -> ast.RepresentationDeclaration:
-        return ast.RepresentationDeclaration(children[0].text, self._doc(span.start), self._comments(span), span)
+        name, *taps = children
+        suffixes = tuple(self._unescape(suffix) for suffix in taps)
+        return ast.RepresentationDeclaration(name.text, suffixes, self._doc(span.start), self._comments(span), span)
 
     def operator(self, span: Span, children: Children) -> ast.OperatorDeclaration:
         name, *rest, brace = children

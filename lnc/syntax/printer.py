@@ -89,8 +89,9 @@ def _statement(statement: ast.Statement | ast.OperatorItem) -> tuple[str, str, s
             return "use", _text(file), "", ()
         case ast.Macro():
             return _macro(statement)
-        case ast.RepresentationDeclaration(name):
-            return "representation", name, "", ()
+        case ast.RepresentationDeclaration(name, taps):
+            written = f"{name} tap {', '.join(_text(suffix) for suffix in taps)}" if taps else name
+            return "representation", written, "", ()
         case ast.OperatorDeclaration():
             return _operator(statement)
     return _item(statement)

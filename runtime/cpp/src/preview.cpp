@@ -11,6 +11,7 @@
 
 #include "ln/film.hpp"
 #include "ln/output_file.hpp"
+#include "srgb.hpp"
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-function"
@@ -47,12 +48,6 @@ float exposure(const Film& film) {
 float compress(float luminance) {
   constexpr float kWhite = 4;
   return luminance * (1 + luminance / (kWhite * kWhite)) / (1 + luminance);
-}
-
-unsigned char srgb_byte(float linear) {
-  const float x = std::clamp(linear, 0.0f, 1.0f);
-  const float encoded = x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x, 1 / 2.4f) - 0.055f;
-  return static_cast<unsigned char>(encoded * 255 + 0.5f);
 }
 
 }  // namespace

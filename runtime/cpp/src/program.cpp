@@ -56,6 +56,7 @@ std::vector<NamedFile> files_of(const Options& options, const ProgramInfo& progr
     names.push_back({"the probe's sensors", probe.sensors, false});
     names.push_back({"a probe", probe.file, true});
   }
+  for (const TapInfo& tap : program.taps) names.push_back({"a tap", tap.file, true});
   for (const LayerInfo& layer : program.layers)
     if (layer.file) names.push_back({"a tap", layer.file, true});
   return names;
@@ -203,7 +204,7 @@ int render_program(const Options& options, const ProgramInfo& program, RunCallba
     throw_if_interrupted();
     outcome = render_picture(context, callbacks, limits_of(options, stats.seconds.prepare + stats.seconds.render), *film);
   }
-  if (film) callbacks.finish(context, *film);
+  callbacks.finish(context, film ? &*film : nullptr);
   stats.samples = outcome.samples;
   stats.interrupted = outcome.interrupted;
   stats.peak_bytes = peak_memory_bytes();

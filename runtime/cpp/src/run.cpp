@@ -172,7 +172,12 @@ RenderOutcome NetworkRun::measure(RunContext& context, const RenderLimits& limit
   return all;
 }
 
-void NetworkRun::finish(RunContext&, const Film& film) {
+void NetworkRun::finish(RunContext&, const Film* film) {
+  write_taps();
+  if (film) write_pictures(*film);
+}
+
+void NetworkRun::write_pictures(const Film& film) const {
   for (std::size_t i = 0; i < program_.layers.size(); ++i) {
     const LayerInfo& layer = program_.layers[i];
     if (!layer.file) continue;

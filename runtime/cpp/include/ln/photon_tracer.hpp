@@ -8,6 +8,8 @@
 
 namespace ln {
 
+struct TapFile;
+
 /// A path expression as a finite automaton over the events D, G, S, each with the tags of the surface that scatters.
 struct PathAutomaton {
   const int* next;        // [state * columns + (event << tag_count | tags)]; -1: no such path
@@ -58,5 +60,8 @@ struct Photons {
 /// Same scene, seed and count: same bits, whatever the number of threads. Throws Error if the photons would take more than
 /// a third of the free memory.
 Photons trace_photons(PrepareContext& context, NodeId node, const Emitters& light, const PathAutomaton& via, std::uint64_t count);
+
+/// .ply: points with normal, direction and flux; .csv: the same as a table. Throws Error.
+void write_tap(const TapFile& tap, const Photons& photons);
 
 }  // namespace ln

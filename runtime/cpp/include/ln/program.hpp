@@ -53,6 +53,13 @@ struct LayerInfo {
   const char* file = nullptr;  // a tap: a picture of its own instead of a layer
 };
 
+/// A wire that is written to a file as it is stored.
+struct TapInfo {
+  const char* wire;
+  const char* light_paths;
+  const char* file;
+};
+
 /// A wire whose irradiance is measured at the sensors of a file.
 struct ProbeInfo {
   const char* wire;     // as the network has it
@@ -69,6 +76,7 @@ struct ProgramInfo {
   std::span<const NodeInfo> nodes = {};
   std::span<const LayerInfo> layers = {};
   bool subtracts = false;  // some wire is subtracted, so samples may be negative
+  std::span<const TapInfo> taps = {};
   std::span<const ProbeInfo> probes = {};
   bool has_image = true;
 
@@ -102,8 +110,8 @@ class RunCallbacks {
   /// many threads. What it adds must depend on pixel and sample number only, never on tile, worker or order. It returns early,
   /// between two samples of a pixel, when tile.stopped().
   virtual void render_tile(const Tile& tile, Film& film) = 0;
-  /// After the picture: taps that are pictures. Called after an interrupt too.
-  virtual void finish(RunContext&, const Film&) {}
+  /// After all other results: taps. Called after an interrupt too. `film` is null if there are no camera rays.
+  virtual void finish(RunContext&, const Film*) {}
   /// Fills scene, rays and nodes; seconds, samples and peak_bytes are filled already.
   virtual void collect(Stats& stats) = 0;
 };

@@ -18,6 +18,8 @@
 
 namespace ln {
 
+struct TapFile;
+
 /// The cell in space that a cell of the domain of `patch` stands for.
 inline SurfaceCell surface_cell(const SurfaceCell& patch, const DomainCell& cell) {
   return {patch.o + cell.o.x * patch.a + cell.o.y * patch.b, cell.a.x * patch.a + cell.a.y * patch.b,
@@ -95,5 +97,8 @@ class QuadTree {
   std::vector<std::uint32_t> roots_;  // by face
   std::vector<QuadTreeNode> nodes_;
 };
+
+/// .glb: the leaves as flat cells. Throws Error.
+void write_tap(const TapFile& tap, const QuadTree& tree);
 
 }  // namespace ln

@@ -5,6 +5,7 @@
 //   void prepare(PrepareStep& step)              work before the picture: step(node id, [&](PrepareContext&) { ... }) each
 //   Color image(Request&) const                  what the eye gets from a surface point; a template
 //   static constexpr int emitters_layer          the layer that shows the emitters that are seen; -1: none does
+//   void write_taps(Write&& write) const         write(i, what is stored) for each TapInfo; a template
 //   auto probes() const                          for each probe, in order, what evaluates its wire: a tuple
 
 #include <atomic>
@@ -22,6 +23,7 @@
 #include "ln/program.hpp"
 #include "ln/render_passes.hpp"
 #include "ln/request.hpp"
+#include "ln/tap.hpp"
 
 namespace ln {
 
@@ -65,21 +67,25 @@ class NetworkRun : public RunCallbacks {
   void build(RunContext& context) override;
   void prepare(RunContext& context) override;
   RenderOutcome measure(RunContext& context, const RenderLimits& limits) override;
-  void finish(RunContext& context, const Film& film) override;
+  void finish(RunContext& context, const Film* film) override;
   void collect(Stats& stats) override;
 
  protected:
   virtual void prepare_network(PrepareStep& step) = 0;
+  virtual void write_taps() {}
   virtual void measure_tile(std::size_t /*probe*/, const Tile&, Film&) {}
 
   const Scene& scene() const { return *scene_; }
   const CameraRays& camera() const { return camera_; }
   PictureSize size() const { return size_; }
   Probe& probe(std::size_t i) { return probes_[i]; }
+  TapFile tap_file(std::size_t i) const { return {program_.network, program_.taps[i], scene().data()}; }
   Tracer& tracer(int worker) { return tracers_[static_cast<std::size_t>(worker)]; }
   std::uint32_t seed_hash() const { return seed_hash_; }
 
  private:
+  void write_pictures(const Film& film) const;
+
   const ProgramInfo& program_;
   std::span<const TagRule> tags_;
   SceneData data_;  // moved into the scene by `build`
@@ -156,6 +162,10 @@ class NetworkProgram final : public NetworkRun {
 
  protected:
   void prepare_network(PrepareStep& step) override { network_.prepare(step); }
+
+  void write_taps() override {
+    network_.write_taps([&](std::size_t i, const auto& stored) { write_tap(tap_file(i), stored); });
+  }
 
   void measure_tile(std::size_t number, const Tile& tile, Film& film) override {
     std::size_t i = 0;

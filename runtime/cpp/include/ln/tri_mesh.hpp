@@ -19,6 +19,8 @@
 
 namespace ln {
 
+struct TapFile;
+
 struct MeshTriangle {
   Vec2 corner[3];           // in the domain of the patch
   std::uint32_t vertex[3];  // whose irradiance is that of the corner
@@ -76,5 +78,8 @@ class TriMesh {
   std::vector<Face> faces_;
   std::vector<Box> boxes_;
 };
+
+/// .glb: the triangles, coloured at their vertices. Throws Error.
+void write_tap(const TapFile& tap, const TriMesh& mesh);
 
 }  // namespace ln

@@ -1,0 +1,173 @@
+"""Taps of what is stored: files that hold the light that closed forms demand, in formats that others read."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks import exr
+
+SCENES = Path(__file__).resolve().parents[1] / "examples" / "scenes"
+sys.path.insert(0, str(SCENES))
+import closed_forms as known  # noqa: E402
+
+NETWORK = """
+network tapped_light
+light   = Lights()
+photons = ParticleTracer(light, count = 100k, via = ())
+direct  = Direct(light)
+cells   = PointsToQuadTree(direct, error = 0.1%)
+smooth  = QuadTreeToTriMesh(cells)
+tap photons -> "photons.ply"
+tap photons -> "photons.csv"
+tap cells   -> "cells.glb"
+tap smooth  -> "smooth.glb"
+"""
+SHOW = """
+network shown
+image Direct(Lights())
+"""
+COLUMNS = ["x", "y", "z", "nx", "ny", "nz", "wi_x", "wi_y", "wi_z", "flux_r", "flux_g", "flux_b"]
+
+
+def read_ply(path: Path) -> np.ndarray:
+    head, _, body = path.read_bytes().partition(b"end_header\n")
+    lines = head.decode("ascii").splitlines()
+    assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
+    types = {"float": "<f4", "uchar": "u1"}
+    fields = [(line.split()[2], types[line.split()[1]]) for line in lines if line.startswith("property")]
+    count = next(int(line.split()[2]) for line in lines if line.startswith("element vertex"))
+    found = np.frombuffer(body, np.dtype(fields))
+    assert len(found) == count
+    return found
+
+
+def read_glb(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, np.ndarray]]]:
+    """The JSON, and by mesh its attributes and its triangles in world coordinates."""
+    data = path.read_bytes()
+    assert data[:4] == b"glTF" and int.from_bytes(data[8:12], "little") == len(data)
+    size = int.from_bytes(data[12:16], "little")
+    model = json.loads(data[20 : 20 + size])
+    binary = data[28 + size :]
+
+    def accessor(i: int) -> np.ndarray:
+        a = model["accessors"][i]
+        view = model["bufferViews"][a["bufferView"]]
+        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[a["type"]]
+        kind = {5126: "<f4", 5125: "<u4"}[a["componentType"]]
+        return np.frombuffer(binary, kind, a["count"] * width, view["byteOffset"]).reshape(a["count"], width)
+
+    meshes = {}
+    for node in model["nodes"]:
+        primitive = model["meshes"][node["mesh"]]["primitives"][0]
+        mesh = {name: accessor(i) for name, i in primitive["attributes"].items()}
+        world = mesh["POSITION"].astype(float) * node["scale"] + node["translation"]
+        mesh["triangles"] = accessor(primitive["indices"])[:, 0].reshape(-1, 3)
+        mesh["corners"] = world[mesh["triangles"]]
+        meshes[node["name"]] = mesh
+    return model, meshes
+
+
+def flux(mesh: dict[str, np.ndarray]) -> np.ndarray:
+    """Integral of the irradiance, which is linear on each triangle."""
+    a, b, c = (mesh["corners"][:, i] for i in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return np.asarray((area[:, None] * mesh["_IRRADIANCE"][mesh["triangles"]].mean(axis=1)).sum(axis=0))
+
+
+def floor_flux() -> np.ndarray:
+    """Of the point light, through the solid angle of the floor (a rectangle cut into four at the foot of the light)."""
+    x, h, z = known.POINT_POSITION
+    solid_angle = sum(
+        math.atan(a * b / (h * math.sqrt(a * a + b * b + h * h)))
+        for a in (known.PLANE_HALF_SIZE - x, known.PLANE_HALF_SIZE + x)
+        for b in (known.PLANE_HALF_SIZE - z, known.PLANE_HALF_SIZE + z)
+    )
+    return known.POINT_INTENSITY * np.array(known.POINT_COLOR) * solid_angle
+
+
+def test_files_hold_the_light(compiled_network, run_program, tmp_path):
+    program = compiled_network("tapped_light", text=NETWORK)
+    run = run_program(program, SCENES / "plane_point.gltf", "--threads", "2")
+    assert run.status == 0, run.stderr
+    assert not run.picture.exists()
+
+    photons = read_ply(tmp_path / "photons.ply")
+    count = 100_000
+    share = len(photons) / count
+    power = np.array([photons[f"flux_{c}"].sum(dtype=float) for c in "rgb"])
+    noise = math.sqrt((1 - share) / share / count)
+    np.testing.assert_allclose(power, floor_flux(), rtol=4 * noise)
+    np.testing.assert_allclose(photons["ny"], 1, atol=1e-3)
+    # Photons come straight from the lamp.
+    position = np.stack([photons[c] for c in "xyz"], axis=-1)
+    wi = np.stack([photons[f"wi_{c}"] for c in "xyz"], axis=-1)
+    towards = np.array(known.POINT_POSITION) - position
+    np.testing.assert_allclose(wi, towards / np.linalg.norm(towards, axis=1)[:, None], atol=2e-4)
+    assert 120 < photons["red"].mean() < 255
+
+    table = np.genfromtxt(tmp_path / "photons.csv", delimiter=",", names=True)
+    assert list(table.dtype.names) == COLUMNS
+    for name in COLUMNS:
+        np.testing.assert_allclose(table[name], photons[name], rtol=1e-6, atol=1e-7)
+
+    for name in ("cells", "smooth"):
+        model, meshes = read_glb(tmp_path / f"{name}.glb")
+        assert list(meshes) == ["front"]
+        mesh = meshes["front"]
+        np.testing.assert_allclose(flux(mesh), floor_flux(), rtol=0.02)
+        exposure = model["asset"]["extras"]["exposure"]
+        np.testing.assert_allclose(mesh["COLOR_0"], np.minimum(mesh["_IRRADIANCE"] * exposure, 1), rtol=1e-5)
+        a, b, c = (mesh["corners"][:, i] for i in range(3))
+        assert (np.cross(b - a, c - a)[:, 1] > 0).all()  # fronts look up
+        np.testing.assert_allclose(mesh["corners"][..., 1], 0, atol=1e-5)
+
+    before = {path.name: path.read_bytes() for path in tmp_path.glob("*.[pcg]*") if path.suffix != ".exr"}
+    run_program(program, SCENES / "plane_point.gltf", "--threads", "1")
+    for name, content in before.items():
+        assert (tmp_path / name).read_bytes() == content, name
+
+
+def test_our_programs_render_what_is_written(compiled_network, run_program, tmp_path):
+    """Seen straight from the front, a cell has its colour."""
+    run_program(compiled_network("tapped_light", text=NETWORK), SCENES / "plane_point.gltf")
+    data = (tmp_path / "smooth.glb").read_bytes()
+    size = int.from_bytes(data[12:16], "little")
+    model = json.loads(data[20 : 20 + size])
+    model["cameras"] = [{"type": "orthographic", "orthographic": {"xmag": 2, "ymag": 1.5, "zfar": 10, "znear": 0.01}}]
+    down = math.sqrt(0.5)
+    model["nodes"].append({"camera": 0, "translation": [0, 3, 0], "rotation": [-down, 0, 0, down]})
+    model["scenes"][0]["nodes"].append(len(model["nodes"]) - 1)
+    text = json.dumps(model).encode()
+    text += b" " * (-len(text) % 4)
+    rest = data[20 + size :]
+    shown = tmp_path / "shown.glb"
+    header = b"glTF" + (2).to_bytes(4, "little") + (20 + len(text) + len(rest)).to_bytes(4, "little")
+    shown.write_bytes(header + len(text).to_bytes(4, "little") + b"JSON" + text + rest)
+    run = run_program(compiled_network("shown", text=SHOW), shown, "--size", "8x6", "--samples", "64")
+    assert run.status == 0, run.stderr
+    picture = exr.read(run.picture)
+    exposure = model["asset"]["extras"]["exposure"]
+    for y in range(6):
+        for x in range(8):
+            place = ((x - 3.5) / 2, 0.0, (y - 2.5) / 2)
+            wanted = known.point_irradiance(known.POINT_POSITION, known.POINT_INTENSITY, place)
+            colour = np.minimum(wanted * np.array(known.POINT_COLOR) * exposure, 1)
+            np.testing.assert_allclose(picture[y, x], colour, rtol=0.06)
+
+
+def test_no_light_gives_an_empty_file(compiled_network, run_program, tmp_path):
+    text = NETWORK.replace("tapped_light", "dark").replace("via = ()", "via = S")
+    text = text.replace("direct  = Direct(light)", 'tag none = node "nowhere"\ndirect  = Direct(light, to = none)')
+    run = run_program(compiled_network("dark", text=text), SCENES / "plane_point.gltf")
+    assert run.status == 0, run.stderr
+    assert len(read_ply(tmp_path / "photons.ply")) == 0
+    assert (tmp_path / "photons.csv").read_text() == ",".join(COLUMNS) + "\n"
+    assert "cells.glb: nothing on this wire is lit" in run.stderr
+    shown = run_program(compiled_network("shown", text=SHOW), tmp_path / "cells.glb", "--size", "4x3")
+    assert shown.status == 0, shown.stderr

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from functools import lru_cache
 
 from lnc.diagnostics import Reporter, did_you_mean, quote
 from lnc.library import Parameter, Scalar
 from lnc.network import ParameterValue, PathValue
-from lnc.paths.automaton import STATE_LIMIT, TooLarge
+from lnc.paths.automaton import STATE_LIMIT, Dfa, EventTable, TooLarge
 from lnc.paths.language import EVENTS, TAG_LIMIT, Alphabet, event_table, path_dfa, tags_in
 from lnc.source import Span
 from lnc.syntax import ast
@@ -123,7 +124,7 @@ def _path(
             raise ValueFault("it lists scattering events only: D, G and S, without L and E")
     try:
         value = _path_value(path)
-        dfa = path_dfa(path, Alphabet(tuple(sorted(used))))
+        dfa, _ = _automata(path)
     except TooLarge:
         raise ValueFault(f"this path needs more than {STATE_LIMIT} states") from None
     if dfa.is_empty:
@@ -178,4 +179,10 @@ def letters_in(path: ast.PathExpression) -> set[str]:
 
 
 def _path_value(path: ast.PathExpression) -> PathValue:
-    return PathValue(print_path(path), path, event_table(path))
+    return PathValue(print_path(path), path, _automata(path)[1])
+
+
+@lru_cache(maxsize=256)
+def _automata(path: ast.PathExpression) -> tuple[Dfa, EventTable]:
+    """A path's automaton and its table; networks repeat the same few paths. Raises TooLarge."""
+    return path_dfa(path, Alphabet(tuple(sorted(tags_in(path))))), event_table(path)

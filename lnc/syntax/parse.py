@@ -141,6 +141,11 @@ class _Parser:
         stack = self.stack
         rule = self.tables.rules[number]
         count = len(rule.keep)
+        if rule.inlined and count == 1:  # most rules: the value stays where it is
+            if type(stack.values[-1]) is not list:
+                stack.values[-1] = [stack.values[-1]] if rule.keep[0] else []
+            stack.states[-1] = self.tables.actions[stack.states[-2]][rule.name]
+            return
         if count:
             values = stack.values[-count:]
             extent = (stack.extents[-count][0], stack.extents[-1][1])
@@ -149,18 +154,15 @@ class _Parser:
             values, extent = [], (token.start, token.start)
         children: list[Any] = []
         for value, keep in zip(values, rule.keep, strict=True):
-            if (
-                type(value) is list
-            ):  # of a rule whose name begins with _: extend in place, or growing lists cost squares
+            if type(value) is list:  # of an inlined rule: extended in place, or growing lists would cost squares
                 if children:
                     children.extend(value)
                 else:
                     children = value
             elif keep:
                 children.append(value)
-        if rule.name.startswith("_"):
-            result: Any = children
-        else:
+        result: Any = children
+        if not rule.inlined:
             result = getattr(self.builder, rule.name)(Span(self.source, *extent), children)
         stack.values.append(result)
         stack.extents.append(extent)

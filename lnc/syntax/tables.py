@@ -10,10 +10,14 @@ from lnc.locations import cached, compiler_fingerprint, grammar_file
 
 @dataclass(frozen=True)
 class Rule:
-    """A production. `keep[i]`: the i-th symbol's value is handed to the action."""
+    """A production. `keep[i]`: the i-th symbol's value is handed to the action.
+
+    `inlined`: its name begins with _, it has no action, and its children become those of the rule above.
+    """
 
     name: str
     keep: tuple[bool, ...]
+    inlined: bool
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,8 @@ def build_tables(grammar: str) -> Tables:
         if entry["__type__"] == "Rule":
             rule_index[number] = len(rules)
             keep = tuple(not symbol.get("filter_out", False) for symbol in entry["expansion"])
-            rules.append(Rule(entry["origin"]["name"], keep))
+            name = entry["origin"]["name"]
+            rules.append(Rule(name, keep, name.startswith("_")))
 
     states: list[dict[str, int]] = [{} for _ in table["states"]]
     for state, row in table["states"].items():

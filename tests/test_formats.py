@@ -234,3 +234,24 @@ def test_a_long_route_is_cut() -> None:
     shown = human(Diagnostic("LN0301", "error", "wrong", span("light"), witness=Witness("LDE", 2, 1, (route, ()))))
     assert len(shown.splitlines()) < 40
     assert "984 more" in shown and " w7 " in shown and " w992 " in shown and " w8 " not in shown
+
+
+# --- Documentation ----------------------------------------------------------------------------------------------------
+
+
+def test_commands_in_the_documentation_of_ci(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every command that docs/ci.md and the hooks of pre-commit name does what it should."""
+    texts = [(ROOT / name).read_text("utf-8") for name in ("docs/ci.md", ".pre-commit-hooks.yaml")]
+    commands = [c for text in texts for c in re.findall(r"(?:- run:|entry:|^   ) lnc ([^>|\n]*)", text, re.MULTILINE)]
+    assert len(commands) == 7
+    monkeypatch.chdir(tmp_path)
+    for folder in ("networks", "scenes"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "networks" / "room_a.ln").write_bytes((ROOT / "examples" / "caustics.ln").read_bytes())
+    (tmp_path / "scenes" / "room.glb").write_bytes((ROOT / "examples" / "scenes" / "mirror_glass.glb").read_bytes())
+    for command in commands:
+        words = [str(found) for word in command.split() for found in (sorted(tmp_path.glob(word)) or [word])]
+        assert main(words if len(words) > 1 and ".ln" in words[-1] else [*words, "networks/room_a.ln"]) == 0, command
+    assert not capsys.readouterr().err

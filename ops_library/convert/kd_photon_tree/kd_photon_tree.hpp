@@ -9,7 +9,7 @@ namespace ln::ops {
 struct KDPhotonTree {
   NodeId node;
 
-  void prepare(PrepareContext& context, const Photons& photons) { map_ = PhotonMap(context, photons); }
+  void prepare(PrepareContext& context, const Photons& photons) { map_ = PhotonMap(context, photons.hits); }
 
   /// The PhotonMap wire.
   const PhotonMap& photon_map() const { return map_; }

@@ -77,14 +77,14 @@ struct PhotonMap::Builder {
   }
 };
 
-PhotonMap::PhotonMap(PrepareContext& context, const Photons& photons) : size_(photons.hits.size()) {
+PhotonMap::PhotonMap(PrepareContext& context, std::span<const Photon> photons) : size_(photons.size()) {
   if (empty()) return;
   const std::size_t block_count = (size_ - 1) / kBlock + 1;
   nodes_.resize(block_count);
   blocks_.resize(block_count);
   Builder builder{*this, std::vector<Builder::Item>(size_)};
   context.for_chunks(size_, 1 << 16, [&](std::size_t begin, std::size_t end, Tracer&) {
-    for (std::size_t i = begin; i < end; ++i) builder.items[i] = {photons.hits[i].position, static_cast<std::uint32_t>(i)};
+    for (std::size_t i = begin; i < end; ++i) builder.items[i] = {photons[i].position, static_cast<std::uint32_t>(i)};
   });
 
   // Split level by level until there are enough tasks, then each range on its own.
@@ -110,7 +110,7 @@ PhotonMap::PhotonMap(PrepareContext& context, const Photons& photons) : size_(ph
           block.normal[i] = block.flux_low[i] = block.flux_high[i] = 0;
           continue;
         }
-        const Photon& photon = photons.hits[builder.items[slot].photon];
+        const Photon& photon = photons[builder.items[slot].photon];
         block.x[i] = photon.position.x;
         block.y[i] = photon.position.y;
         block.z[i] = photon.position.z;
@@ -122,17 +122,10 @@ PhotonMap::PhotonMap(PrepareContext& context, const Photons& photons) : size_(ph
   });
 }
 
-std::size_t PhotonMap::nearest(const Neighbourhood& around, float max_distance2, std::size_t wanted, NearPhoton* found) const {
-  if (empty() || wanted == 0) return 0;
+template <class Use, class AfterBlock>
+void PhotonMap::search(const Neighbourhood& around, const float& limit, Use&& use, AfterBlock&& after_block) const {
+  if (empty()) return;
   const Vec3 p = around.point, n = around.normal;
-  std::size_t count = 0;
-  float limit = max_distance2;
-  const auto nearer = [](const NearPhoton& a, const NearPhoton& b) { return a.distance2 < b.distance2; };
-  const auto keep_nearest = [&] {
-    std::nth_element(found, found + (wanted - 1), found + count, nearer);
-    count = wanted;
-    limit = found[wanted - 1].distance2;
-  };
 
   // Neighbours mostly share their normal: decide once for a run of equal ones.
   std::uint32_t last_normal = 0;
@@ -183,12 +176,76 @@ std::size_t PhotonMap::nearest(const Neighbourhood& around, float max_distance2,
     unsigned near = lane_bits((distance2 < limit) & (height * height * (1 + kSlope2) <= kSlope2 * distance2 + 1e-12f));
     for (; near != 0; near &= near - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(near));
-      if (agrees(block.normal[i])) found[count++] = {distance2[i], range.begin * kBlock + i};
+      if (agrees(block.normal[i])) use(NearPhoton{distance2[i], range.begin * kBlock + i});
     }
-    if (count > 2 * wanted) keep_nearest();  // the next block has room again
+    after_block();
+  }
+}
+
+float PhotonMap::likely_distance2(const Vec3& p, std::size_t wanted) const {
+  // The photons of the smallest range around the point that has so many.
+  std::uint32_t begin = 0, end = static_cast<std::uint32_t>(blocks_.size());
+  while ((end - begin) / 2 * kBlock >= wanted) {
+    const std::uint32_t middle = (begin + end) / 2;
+    if (p[nodes_[middle].axis] < nodes_[middle].split) end = middle;
+    else begin = middle;
+  }
+  Lanes low[3], high[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    low[axis] = Lanes{} + kNowhere;
+    high[axis] = Lanes{} - kNowhere;
+  }
+  for (std::uint32_t b = begin; b < end; ++b) {
+    const float* const coordinates[3] = {blocks_[b].x, blocks_[b].y, blocks_[b].z};
+    for (int axis = 0; axis < 3; ++axis) {
+      const Lanes x = load(coordinates[axis]);
+      low[axis] = x < low[axis] ? x : low[axis];
+      high[axis] = (x > high[axis]) & (x < kNowhere) ? x : high[axis];
+    }
+  }
+  float size[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    float least = kNowhere, most = -kNowhere;
+    for (std::uint32_t i = 0; i < kBlock; ++i) {
+      least = std::min(least, low[axis][i]);
+      most = std::max(most, high[axis][i]);
+    }
+    size[axis] = most - least;
+  }
+  // They lie on a surface: two of the three sides are its.
+  std::sort(size, size + 3);
+  constexpr float kMargin = 1.5f;
+  const auto count = static_cast<float>((end - begin) * kBlock);
+  return std::max(size[1] * size[2] * kInvPi * kMargin * static_cast<float>(wanted) / count, 1e-12f);
+}
+
+std::size_t PhotonMap::nearest(const Neighbourhood& around, float max_distance2, std::size_t wanted, NearPhoton* found) const {
+  if (wanted == 0 || empty()) return 0;
+  std::size_t count = 0;
+  float limit = 0;
+  const auto keep_nearest = [&] {
+    const auto nearer = [](const NearPhoton& a, const NearPhoton& b) { return a.distance2 < b.distance2; };
+    std::nth_element(found, found + (wanted - 1), found + count, nearer);
+    count = wanted;
+    limit = found[wanted - 1].distance2;
+  };
+  // Most of the time goes into sorting out what is too far: begin with a ball that will hardly have too many.
+  for (float ball = likely_distance2(around.point, wanted);; ball *= 4) {
+    count = 0;
+    limit = std::min(ball, max_distance2);
+    search(
+        around, limit, [&](const NearPhoton& photon) { found[count++] = photon; },
+        [&] {
+          if (count > 2 * wanted) keep_nearest();  // the next block has room again
+        });
+    if (count >= wanted || ball >= max_distance2) break;
   }
   if (count >= wanted) keep_nearest();
   return count;
+}
+
+void PhotonMap::within(const Neighbourhood& around, float max_distance2, FunctionRef<void(const NearPhoton&)> use) const {
+  search(around, max_distance2, use, [] {});
 }
 
 }  // namespace ln

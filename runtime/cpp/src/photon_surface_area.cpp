@@ -37,8 +37,14 @@ const Directions kDirection;
 /// Integral of the kernel over a disc of radius sqrt(q), as a share of pi; q: squared distance.
 template <PhotonKernel kernel>
 float kernel_integral(float q) {
-  return kernel == PhotonKernel::constant ? q : q - (2.0f / 3) * q * std::sqrt(q);
+  if constexpr (kernel == PhotonKernel::constant) return q;
+  if constexpr (kernel == PhotonKernel::cone) return q - (2.0f / 3) * q * std::sqrt(q);
+  return q - 0.5f * q * q;
 }
+
+/// The same of the parabola times the distance, and times its square.
+float parabola_first(float q) { return q * std::sqrt(q) * (2.0f / 3 - 2.0f / 5 * q); }
+float parabola_second(float q) { return q * q * (0.5f - 1.0f / 3 * q); }
 
 /// A triangle in the frame of the tangent plane: z is the height.
 struct LocalTriangle {
@@ -66,12 +72,6 @@ class Sweep {
     }
   }
 
-  void ignore_blockers() {
-    std::fill(reach_, reach_ + kDirections, 1.0f);
-    std::fill(covered_, covered_ + kDirections, 0u);
-    sum_ = whole_ = 0;
-  }
-
   void add(const LocalTriangle& triangle) {
     const auto [a, b, c] = triangle.corner;
     const Vec3 low = glm::min(a, glm::min(b, c)), high = glm::max(a, glm::max(b, c));
@@ -93,8 +93,10 @@ class Sweep {
   }
 
   /// Integral of the kernel over the surface that is visible, and over all of it.
-  float visible() const { return sum_ * (kPi / kDirections); }
-  float whole() const { return whole_ * (kPi / kDirections); }
+  float visible() const { return visible_.one * (kPi / kDirections); }
+  float whole() const { return whole_.one * (kPi / kDirections); }
+  SurfaceMoments visible_moments() const { return scaled(visible_); }
+  SurfaceMoments whole_moments() const { return scaled(whole_); }
 
  private:
   static constexpr int kQuadrant = kDirections / 4;
@@ -162,10 +164,28 @@ class Sweep {
       if (fresh == 0) return;
       density *= static_cast<float>(std::popcount(fresh)) / static_cast<float>(std::popcount(rings));
     }
-    const float start = kernel_integral<kernel>(from);
-    whole_ += density * (kernel_integral<kernel>(to) - start);
+    accumulate(whole_, direction, from, to, density);
     const float end = std::min(to, reach_[direction]);
-    if (end > from) sum_ += density * (kernel_integral<kernel>(end) - start);
+    if (end > from) accumulate(visible_, direction, from, end, density);
+  }
+
+  static void accumulate(SurfaceMoments& sums, int direction, float from, float to, float density) {
+    sums.one += density * (kernel_integral<kernel>(to) - kernel_integral<kernel>(from));
+    if constexpr (kernel == PhotonKernel::parabola) {
+      const float dx = kDirection.x[direction], dy = kDirection.y[direction];
+      const float first = density * (parabola_first(to) - parabola_first(from));
+      const float second = density * (parabola_second(to) - parabola_second(from));
+      sums.x += first * dx;
+      sums.y += first * dy;
+      sums.xx += second * dx * dx;
+      sums.xy += second * dx * dy;
+      sums.yy += second * dy * dy;
+    }
+  }
+
+  static SurfaceMoments scaled(SurfaceMoments m) {
+    for (float* value : {&m.one, &m.x, &m.y, &m.xx, &m.xy, &m.yy}) *value *= kPi / kDirections;
+    return m;
   }
 
   /// The rings within the squared distance q.
@@ -176,7 +196,7 @@ class Sweep {
 
   alignas(32) float reach_[kDirections];  // squared distance up to which the surface is visible
   std::uint64_t covered_[kDirections] = {};
-  float sum_ = 0, whole_ = 0;
+  SurfaceMoments visible_, whole_;
 };
 
 /// Interleaves zeros between the lower 20 bits.
@@ -320,7 +340,7 @@ bool crossing(const LocalTriangle& triangle, SurfaceBlocker& line) {
 
 template <PhotonKernel kernel>
 void measure_with(const SceneData& data, const Neighbourhood& around, float radius, const std::uint32_t* found, int count,
-                  SurfaceCoverage& coverage) {
+                  TriangleFilter filter, SurfaceCoverage& coverage) {
   const Frame frame = make_frame(around.normal);
   const float side = around.front ? 1.0f : -1.0f;
   const float scale = 1 / radius;
@@ -341,6 +361,7 @@ void measure_with(const SceneData& data, const Neighbourhood& around, float radi
                                {glm::dot(b, coverage.s), glm::dot(b, coverage.t), hb},
                                {glm::dot(c, coverage.s), glm::dot(c, coverage.t), hc}}};
     if (agreement > 0 && agreement * agreement > Neighbourhood::kMinCos * Neighbourhood::kMinCos * glm::dot(normal, normal)) {
+      if (!filter(found[i])) continue;
       facing[facing_count] = local;
       if (!around.front) std::swap(facing[facing_count].corner[1], facing[facing_count].corner[2]);  // seen from behind
       ++facing_count;
@@ -356,8 +377,10 @@ void measure_with(const SceneData& data, const Neighbourhood& around, float radi
   }
   for (int i = 0; i < facing_count; ++i) sweep.add(facing[i]);
   coverage.area = sweep.visible() * radius * radius;
+  coverage.moments = sweep.visible_moments();
   if (sweep.visible() < kMinVisibleShare * sweep.whole()) {
     coverage.area = sweep.whole() * radius * radius;
+    coverage.moments = sweep.whole_moments();
     coverage.blockers = 0;
   }
 }
@@ -377,18 +400,29 @@ bool SurfaceCoverage::hides(const Vec3& offset) const {
   return false;
 }
 
-void SurfaceArea::measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage) const {
+void SurfaceArea::measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage,
+                          TriangleFilter filter) const {
   std::uint32_t found[kMaxTriangles];
   const int count = collect(around, radius, found);
   if (count < 0) {
-    coverage.area = (kernel == PhotonKernel::constant ? kPi : kPi / 3) * radius * radius;
+    const SurfaceMoments disc{kPi / 2, 0, 0, kPi / 12, 0, kPi / 12};  // of the parabola
+    const float share = kernel == PhotonKernel::constant ? kPi : kernel == PhotonKernel::cone ? kPi / 3 : disc.one;
+    const Frame frame = make_frame(around.normal);
+    coverage.area = share * radius * radius;
+    coverage.moments = disc;
     coverage.blockers = 0;
+    coverage.s = frame.s / radius;
+    coverage.t = frame.t / radius;
     return;
   }
-  if (kernel == PhotonKernel::constant)
-    measure_with<PhotonKernel::constant>(*data_, around, radius, found, count, coverage);
-  else
-    measure_with<PhotonKernel::cone>(*data_, around, radius, found, count, coverage);
+  switch (kernel) {
+    case PhotonKernel::constant:
+      return measure_with<PhotonKernel::constant>(*data_, around, radius, found, count, filter, coverage);
+    case PhotonKernel::cone:
+      return measure_with<PhotonKernel::cone>(*data_, around, radius, found, count, filter, coverage);
+    case PhotonKernel::parabola:
+      return measure_with<PhotonKernel::parabola>(*data_, around, radius, found, count, filter, coverage);
+  }
 }
 
 }  // namespace ln

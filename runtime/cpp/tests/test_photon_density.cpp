@@ -15,7 +15,7 @@ namespace {
 struct Estimate {
   explicit Estimate(const SceneData& data, std::uint64_t count, int neighbours = 60, PhotonKernel kernel = PhotonKernel::cone,
                     const PathAutomaton& via = path_automaton<AnyPath>(), std::uint64_t seed = 1)
-      : stage(data, 2, seed), photons(trace_photons(stage.context, 1, stage.scene.emitters(), via, count)), map(stage.context, photons),
+      : stage(data, 2, seed), photons(trace_photons(stage.context, 1, stage.scene.emitters(), via, count)), map(stage.context, photons.hits),
         density(stage.context, map, neighbours, 0, kernel) {}
 
   /// Mean irradiance (first channel) at the points that `place` makes of the unit square.

@@ -54,7 +54,7 @@ TEST_CASE("the nearest photons are those that a search of all finds") {
   const SampleStream random(5, 0);
   for (const std::uint32_t n : {1u, 7u, 8u, 9u, 100u, 20'000u, 150'000u}) {
     const Photons photons = scattered(n);
-    const PhotonMap map(stage.context, photons);
+    const PhotonMap map(stage.context, photons.hits);
     CHECK(map.size() == n);
     for (const std::size_t wanted : {1u, 2u, 10u, 60u, 500u}) {
       std::vector<NearPhoton> found(PhotonMap::capacity(wanted));
@@ -91,7 +91,7 @@ TEST_CASE("the map keeps every photon once, in the same place for any number of 
   std::vector<std::vector<float>> fluxes;
   for (const int threads : {1, 2, 5}) {
     Stage stage(b.data, threads);
-    const PhotonMap map(stage.context, photons);
+    const PhotonMap map(stage.context, photons.hits);
     std::vector<float>& f = fluxes.emplace_back();
     for (std::uint32_t i = 0; i < map.size(); ++i) f.push_back(map.flux(i).x);
   }

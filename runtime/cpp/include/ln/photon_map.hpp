@@ -29,7 +29,7 @@ struct Neighbourhood {
 class PhotonMap {
  public:
   PhotonMap() = default;
-  PhotonMap(PrepareContext& context, const Photons& photons);
+  PhotonMap(PrepareContext& context, std::span<const Photon> photons);
 
   std::size_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
@@ -38,6 +38,9 @@ class PhotonMap {
   /// capacity(wanted). Returns their number; if it is `wanted`, the last is the farthest, the others are in no order.
   std::size_t nearest(const Neighbourhood& around, float max_distance2, std::size_t wanted, NearPhoton* found) const;
   static constexpr std::size_t capacity(std::size_t wanted) { return 2 * wanted + kBlock; }
+
+  /// Calls `use` for each photon of a neighbourhood within sqrt(max_distance2).
+  void within(const Neighbourhood& around, float max_distance2, FunctionRef<void(const NearPhoton&)> use) const;
 
   Vec3 position(std::uint32_t slot) const {
     const Block& b = blocks_[slot / kBlock];
@@ -64,6 +67,14 @@ class PhotonMap {
     std::uint32_t axis;
   };
   struct Builder;
+
+  /// Calls `use(photon)` for photons of a neighbourhood nearer than sqrt(limit), and `after_block()` after each block of them,
+  /// which may lower the limit.
+  template <class Use, class AfterBlock>
+  void search(const Neighbourhood& around, const float& limit, Use&& use, AfterBlock&& after_block) const;
+
+  /// Squared distance within which `wanted` photons are likely to be found around `p`.
+  float likely_distance2(const Vec3& p, std::size_t wanted) const;
 
   std::size_t size_ = 0;
   std::vector<Block> blocks_;

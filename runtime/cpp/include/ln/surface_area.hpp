@@ -7,8 +7,21 @@
 
 namespace ln {
 
-/// Weight of a photon at distance d of the kernel's radius r: 1, or 1 - d/r.
-enum class PhotonKernel : std::uint8_t { constant, cone };
+/// Weight of a photon at distance d of the kernel's radius r: 1, 1 - d/r, or 1 - (d/r)^2.
+enum class PhotonKernel : std::uint8_t { constant, cone, parabola };
+
+/// Integrals over a surface of a kernel times 1, x, y, x^2, xy, y^2. (x, y): direction in the tangent plane times distance [radii].
+struct SurfaceMoments {
+  float one = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+};
+
+/// A part of the scene's triangles: those with `label[triangle] == wanted`; all, if `label` is null.
+struct TriangleFilter {
+  const std::uint32_t* label = nullptr;
+  std::uint32_t wanted = 0;
+
+  bool operator()(std::uint32_t triangle) const { return !label || label[triangle] == wanted; }
+};
 
 /// A wall that stands on the surface around a point, as a line in the tangent plane [radii]: what is behind it does not count.
 struct SurfaceBlocker {
@@ -20,6 +33,7 @@ struct SurfaceCoverage {
   static constexpr int kMaxBlockers = 64;
 
   float area = 0;  // integral of the kernel over the visible surface of the neighbourhood
+  SurfaceMoments moments;  // the same by powers of the place [radii]; for the parabola only
   int blockers = 0;
   SurfaceBlocker blocker[kMaxBlockers];
   Vec3 s, t;       // axes of the tangent plane, divided by the radius
@@ -34,9 +48,9 @@ class SurfaceArea {
   SurfaceArea() = default;
   SurfaceArea(PrepareContext& context, const SceneData& data);
 
-  /// Measures the surface of a neighbourhood within `radius`. Where more than `kMaxTriangles` are that near, the surface is
-  /// taken to be a full disc.
-  void measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage) const;
+  /// Measures the surface of a neighbourhood within `radius`, of the filter's triangles. Where more than `kMaxTriangles` are that
+  /// near, the surface is taken to be a full disc.
+  void measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage, TriangleFilter filter = {}) const;
 
   static constexpr int kMaxTriangles = 2048;
 

@@ -1,0 +1,266 @@
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include <cstring>
+#include <functional>
+
+#include "ln/mesh_reduction.hpp"
+#include "ln/photon_mesh.hpp"
+#include "photon_scenes.hpp"
+
+using namespace ln;
+using namespace ln::test;
+
+namespace {
+
+/// The mesh of a scene's photons.
+struct Meshed {
+  explicit Meshed(const SceneData& data, std::uint64_t count, const PathAutomaton& via = path_automaton<AnyPath>(),
+                  int threads = 2)
+      : stage(data, threads),
+        photons(trace_photons(stage.context, 1, stage.scene.emitters(), via, count)),
+        sorted(sort_by_surface(stage.scene.data(), photons.hits)),
+        mesh(photon_mesh(stage.context, sorted, {.node = 1})) {}
+
+  /// Irradiance (first channel) at what a ray from `from` hits.
+  double at(const TriMesh& of, const Vec3& from, const Vec3& direction) const {
+    const Ray ray{from, glm::normalize(direction)};
+    const Hit hit = stage.scene.accel().intersect(ray, 0);
+    REQUIRE(hit.found());
+    const Interaction x(stage.scene, ray, hit);
+    return static_cast<double>(of.irradiance(hit.triangle, hit.u, hit.v, x.front).x);
+  }
+
+  /// Mean over the floor points that `place` makes of the unit square, seen from above.
+  double mean(const std::function<Vec2(Vec2)>& place, std::uint32_t n = 2000) const {
+    const SampleStream random(5, 0);
+    double sum = 0;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const Vec2 p = place(random.get2(0, i, n));
+      sum += at(mesh, {p.x, 0.9f, p.y}, {0, -1, 0});
+    }
+    return sum / n;
+  }
+
+  Stage stage;
+  Photons photons;
+  SortedPhotons sorted;
+  TriMesh mesh;
+};
+
+void floor(SceneBuilder& b, int pieces = 1) {
+  b.quad({-0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, -0.7f}, {-0.7f, 0.01f, -0.7f}, b.material(Color(0.5f)),
+         pieces);
+}
+
+/// The integral of a mesh over all surfaces: its flux.
+double flux(const TriMesh& mesh) {
+  double sum = 0;
+  for (std::uint32_t face = 0; face < mesh.patches().face_count(); ++face) {
+    const SurfaceCell cell = mesh.patches().surface(face / 2);
+    for (const MeshTriangle& t : mesh.triangles(face)) {
+      const Vec2 a = t.corner[1] - t.corner[0], b = t.corner[2] - t.corner[0];
+      const float area = 0.5f * (a.x * b.y - a.y * b.x) * glm::length(glm::cross(cell.a, cell.b));
+      for (const std::uint32_t v : t.vertex) sum += static_cast<double>(area * mesh.vertices()[v].x) / 3;
+    }
+  }
+  return sum;
+}
+
+/// Photons on a floor whose irradiance is linear in x from `low` to `high`: where they fall is decided by inversion.
+Photons linear_photons(const Scene& scene, float low, float high, std::uint32_t n) {
+  Photons photons;
+  const SampleStream random(11, 0);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const Vec2 u = random.get2(0, i, n);
+    // The share of the flux up to x in [0, 1]: (low x + (high - low) x^2 / 2) / mean.
+    const float mean = 0.5f * (low + high), slope = high - low;
+    const float x = slope == 0 ? u.x : (std::sqrt(low * low + 2 * slope * mean * u.x) - low) / slope;
+    const Ray ray{{1.4f * x - 0.7f, 0.5f, 1.4f * u.y - 0.7f}, {0, -1, 0}};
+    Photon photon;
+    photon.triangle = scene.accel().intersect(ray, 0).triangle;
+    photon.position = {ray.origin.x, 0.01f, ray.origin.z};
+    photon.normal = PackedNormal({0, 1, 0}, true);
+    photon.flux = PackedColor(Color(mean * sqr(1.4f) / static_cast<float>(n)));
+    photons.hits.push_back(photon);
+  }
+  return photons;
+}
+
+}  // namespace
+
+TEST_CASE("photons are sorted by the side of what goes on without a crease") {
+  SceneBuilder b;
+  b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f), Color(1)), true, 3);
+  b.sphere(Vec3(0), 0.2f, b.material(Color(0.5f)), false, 20);
+  const Meshed m(b.data, 20'000);
+  std::size_t lit = 0, total = 0;
+  for (std::size_t s = 0; s < m.sorted.surface_count(); ++s) {
+    if (m.sorted.on(s).empty()) continue;
+    ++lit;
+    total += m.sorted.on(s).size();
+    bool all_here = true;
+    for (const Photon& photon : m.sorted.on(s))
+      all_here &= 2 * m.sorted.sheet_of_triangle[photon.triangle] + (photon.normal.front() ? 0 : 1) == s;
+    CHECK(all_here);
+  }
+  CHECK_EQ(lit, 7);  // six walls of nine quads each, one sphere
+  CHECK_EQ(total, m.photons.hits.size());
+}
+
+TEST_CASE("an irradiance that is linear comes out as it is, up to borders and corners") {
+  SceneBuilder b;
+  floor(b);
+  Stage stage(b.data);
+  constexpr std::uint32_t kCount = 400'000;
+  const Photons photons = linear_photons(stage.scene, 1, 5, kCount);
+  const SortedPhotons sorted = sort_by_surface(stage.scene.data(), photons.hits);
+  const TriMesh mesh = photon_mesh(stage.context, sorted, {});
+  const auto at = [&](float x, float z) {
+    const Hit hit = stage.scene.accel().intersect({{x, 0.5f, z}, {0, -1, 0}}, 0);
+    return static_cast<double>(mesh.irradiance(hit.triangle, hit.u, hit.v, true).x);
+  };
+  const auto truth = [](float x) { return 3 + 2 * static_cast<double>(x) / 0.7; };
+  // Strips along both ends, where an estimate without correction would give half, and one that only divides by the area the
+  // irradiance of the strip's inside: 0.04 more or less at this radius.
+  for (const float x : {-0.699f, 0.699f, -0.35f, 0.0f, 0.35f}) {
+    double sum = 0, sum2 = 0;
+    constexpr int kPoints = 60;  // farther apart than kernels are wide
+    for (int i = 0; i < kPoints; ++i) {
+      const double E = at(x, (static_cast<float>(i) + 0.5f) * (1.4f / kPoints) - 0.7f) - truth(x);
+      sum += E;
+      sum2 += E * E;
+    }
+    const double mean = sum / kPoints, error = std::sqrt((sum2 / kPoints - mean * mean) / (kPoints - 1));
+    CAPTURE(x);
+    CHECK(std::abs(mean) < 4 * error);
+    CHECK(error < 0.015 * truth(x));
+  }
+}
+
+TEST_CASE("a plane under a directional light is evenly lit up to its border, in one piece or many") {
+  for (const int pieces : {1, 7}) {
+    SceneBuilder b;
+    floor(b, pieces);
+    b.directional({0.3f, -1, 0.2f}, Color(3));
+    const Meshed m(b.data, 400'000);
+    const double truth = 3 / std::sqrt(1 + 0.09 + 0.04);
+    CHECK(m.mean([](Vec2 u) { return Vec2(1.4f * u.x - 0.7f, 1.4f * u.y - 0.7f); }) == doctest::Approx(truth).epsilon(0.01));
+    CHECK(m.mean([](Vec2 u) { return Vec2(0.699f - 0.01f * u.x, 1.398f * u.y - 0.699f); }) ==
+          doctest::Approx(truth).epsilon(0.02));
+    CHECK(m.mean([](Vec2 u) { return Vec2(0.699f - 0.01f * u.x, 0.01f * u.y - 0.699f); }) ==
+          doctest::Approx(truth).epsilon(0.15));
+  }
+}
+
+TEST_CASE("the mesh has the energy of the photons") {
+  SceneBuilder b;
+  b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), b.material(Color(0.5f), Color(1)));
+  b.sphere(Vec3(0.1f, 0, 0), 0.2f, b.material(Color(0.7f)), false, 30);
+  const Meshed m(b.data, 200'000);
+  const double truth = total_flux(m.photons).x;
+  CHECK(flux(m.mesh) == doctest::Approx(truth).epsilon(0.005));
+}
+
+TEST_CASE("things that stand on a floor leave no dark rim") {
+  SceneBuilder b;
+  floor(b);
+  b.box({-0.2f, 0.01f, -0.2f}, {0.2f, 0.3f, 0.2f}, b.material(Color(0.5f)), false);
+  b.directional({0, -1, 0}, Color(1));
+  const Meshed m(b.data, 300'000, path_automaton<EmptyPath>());
+  CHECK(m.mean([](Vec2 u) { return Vec2(0.202f + 0.01f * u.x, 0.3f * u.y - 0.15f); }) == doctest::Approx(1).epsilon(0.04));
+  CHECK(m.mean([](Vec2 u) { return Vec2(0.4f + 0.2f * u.x, u.y - 0.5f); }) == doctest::Approx(1).epsilon(0.02));
+}
+
+TEST_CASE("a surface that few photons hit has their flux over its area") {
+  SceneBuilder b;
+  floor(b, 3);
+  b.directional({0, -1, 0}, Color(2));
+  const Meshed m(b.data, 300);
+  const double hit = total_flux(m.photons).x;
+  CHECK(m.at(m.mesh, {0.1f, 0.5f, 0.2f}, {0, -1, 0}) == doctest::Approx(hit / (1.4 * 1.4)).epsilon(1e-4));
+  CHECK(m.at(m.mesh, {0.1f, -0.5f, 0.2f}, {0, 1, 0}) == 0);
+}
+
+TEST_CASE("a curved surface of many triangles has no cracks and no facets") {
+  SceneBuilder b;
+  b.sphere(Vec3(0), 0.8f, b.material(Color(0.5f), Color(1)), true, 24);
+  const Meshed m(b.data, 200'000);
+  const SampleStream random(3, 0);
+  double sum = 0;
+  constexpr std::uint32_t n = 4000;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const Vec2 u = random.get2(0, i, n);
+    const float z = 1 - 2 * u.x, r = safe_sqrt(1 - z * z);
+    const double E = m.at(m.mesh, Vec3(0), {r * std::cos(2 * kPi * u.y), r * std::sin(2 * kPi * u.y), z});
+    CHECK(E > 3.5);
+    sum += E;
+  }
+  CHECK(sum / n == doctest::Approx(2 * static_cast<double>(kPi)).epsilon(0.01));
+}
+
+TEST_CASE("any number of threads makes the same mesh") {
+  SceneBuilder b;
+  b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f), Color(1)));
+  const Meshed one(b.data, 10'000, path_automaton<AnyPath>(), 1);
+  for (const int threads : {2, 5}) {
+    const Meshed many(b.data, 10'000, path_automaton<AnyPath>(), threads);
+    for (const auto& [x, y] :
+         {std::pair{one.mesh, many.mesh}, std::pair{reduce(one.mesh, 0.05f, const_cast<Stage&>(one.stage).workers),
+                                                    reduce(many.mesh, 0.05f, const_cast<Stage&>(many.stage).workers)}}) {
+      REQUIRE_EQ(x.vertices().size(), y.vertices().size());
+      REQUIRE_EQ(x.triangles().size(), y.triangles().size());
+      CHECK(std::memcmp(x.vertices().data(), y.vertices().data(), x.vertices().size() * sizeof(Color)) == 0);
+      CHECK(std::memcmp(x.triangles().data(), y.triangles().data(), x.triangles().size() * sizeof(MeshTriangle)) == 0);
+    }
+  }
+}
+
+TEST_CASE("a reduced mesh keeps its bound everywhere, and what is linear becomes two triangles") {
+  SceneBuilder b;
+  b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f), Color(1)));
+  b.sphere(Vec3(0.1f, -0.2f, 0), 0.2f, b.material(Color(0.5f)), false, 12);
+  Meshed m(b.data, 50'000);
+  double area = 0;
+  for (const double a : m.sorted.sheet_area) area += a;
+  const double mean = flux(m.mesh) / area;
+  std::size_t last = m.mesh.triangles().size() + 1;
+  for (const float error : {0.0f, 0.02f, 0.1f, 0.5f}) {
+    CAPTURE(error);
+    const TriMesh reduced = reduce(m.mesh, error, m.stage.workers);
+    CHECK(reduced.triangles().size() < last);
+    last = reduced.triangles().size();
+    const SampleStream random(7, 0);
+    double most = 0;
+    for (std::uint32_t i = 0; i < 20'000; ++i) {
+      const auto face =
+          static_cast<std::uint32_t>(random.get1(1, i, 20'000) * static_cast<float>(m.mesh.patches().face_count()));
+      const DomainCell domain = m.mesh.patches().domain(face / 2);
+      const Vec2 st = domain.point(random.get2(0, i, 20'000));
+      most = std::max(most, static_cast<double>(std::abs(reduced.irradiance(face, st).x - m.mesh.irradiance(face, st).x)));
+    }
+    CHECK(most <= (static_cast<double>(error) + 2e-4) * mean);
+    if (error >= 0.1f) CHECK(most > 0.2 * static_cast<double>(error) * mean);
+  }
+
+  TriMesh linear(m.mesh.shared_patches());
+  constexpr int n = 16;
+  std::vector<MeshTriangle> triangles;
+  for (int j = 0; j <= n; ++j)
+    for (int i = 0; i <= n; ++i) linear.add_vertex(Color(static_cast<float>(1 + 3 * i + j)));
+  for (std::uint32_t j = 0; j < n; ++j) {
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::uint32_t k = j * (n + 1) + i;
+      const auto st = [&](std::uint32_t di, std::uint32_t dj) {
+        return Vec2(static_cast<float>(i + di), static_cast<float>(j + dj)) / static_cast<float>(n);
+      };
+      triangles.push_back({{st(0, 0), st(1, 0), st(1, 1)}, {k, k + 1, k + n + 2}});
+      triangles.push_back({{st(0, 0), st(1, 1), st(0, 1)}, {k, k + n + 2, k + n + 1}});
+    }
+  }
+  linear.add_triangles(0, triangles);
+  linear.finish(m.stage.workers);
+  const TriMesh reduced = reduce(linear, 0.001f, m.stage.workers);
+  CHECK_EQ(reduced.triangles().size(), 2);
+  CHECK_EQ(reduced.irradiance(0, Vec2(0.3f, 0.6f)).x == doctest::Approx(1 + 48 * 0.3 + 16 * 0.6), true);
+}

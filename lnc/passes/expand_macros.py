@@ -43,7 +43,8 @@ def expand_macros(file: ast.File, operators: set[str], read: Read, reporter: Rep
         return Expanded(file)
     macros = _Macros(operators, read, reporter)
     macros.collect(file)
-    return _Expander(macros.found, file.broken | macros.broken, reporter).run(file)
+    known = operators if macros.unread else None
+    return _Expander(macros.found, file.broken | macros.broken, known, reporter).run(file)
 
 
 class _Macros:
@@ -56,6 +57,7 @@ class _Macros:
         self.found: dict[str, ast.Macro] = {}
         self.files: set[str] = set()
         self.broken: set[str] = set()
+        self.unread = False  # whether a file could not be read that may hold any macro
 
     def collect(self, file: ast.File) -> None:
         queue = [file]
@@ -76,6 +78,7 @@ class _Macros:
             source = self.read(use.file, use.span.source)
         except OSError as error:
             self.reporter.error("LN0111", use.span, f"{quote(use.file)} cannot be used: {error}")
+            self.unread = True
             return None
         if source.name in self.files:
             return None
@@ -116,8 +119,13 @@ class _Instance:
 
 
 class _Expander:
-    def __init__(self, macros: dict[str, ast.Macro], broken: frozenset[str], reporter: Reporter) -> None:
+    """`operators`: all names of operators, if a macro of any other name may be missing; else None."""
+
+    def __init__(
+        self, macros: dict[str, ast.Macro], broken: frozenset[str], operators: set[str] | None, reporter: Reporter
+    ) -> None:
         self.macros = macros
+        self.operators = operators
         self.reporter = reporter
         self.names = Names(())
         self.calls: dict[Span, Span] = {}
@@ -170,6 +178,8 @@ class _Expander:
                 given = self._arguments(arguments, instance)
                 return wire.changed(wire=self._wire(inner, home, instance), arguments=given)
         if wire.op not in self.macros:
+            if self.operators is not None and wire.op not in self.operators:
+                self.broken.add(wire.op)
             inputs = tuple(self._wire(w, home, instance) for w in wire.inputs)
             return wire.changed(inputs=inputs, arguments=self._arguments(wire.arguments, instance))
         name = self.names.derived(home, wire.op)
@@ -228,6 +238,8 @@ class _Expander:
             inner_name = name if inner.name == RESULT else self.names.free(f"{name}_{inner.name}")
             wires[inner.name] = ast.WireName(inner_name, inner.name_span)
         inside = _Instance(wires, values, (*instance.trail, call.op), macro)
+        if RESULT not in wires:
+            self.broken.add(name)
         for inner in reversed(macro.body):
             target = wires[inner.name]
             assert isinstance(target, ast.WireName)

@@ -335,7 +335,8 @@ class _Resolver:
             if port_named is not None:
                 wrong |= not self._named_port(argument, port_named, given)
         missing = [p for p in op.ports if p.name not in given]
-        if missing and not wrong:
+        misspelt = any(isinstance(a.value, ast.NameValue) for a in _unknown_arguments(call, op))
+        if missing and not wrong and not misspelt:
             wanted = " and ".join(f"'{p.name}: {p.representation}'" for p in missing)
             message = f"'{op.name}' needs its input {wanted}"
             self.reporter.error("LN0105", call.span, message, related=[_declared_here(op, missing[0].span)])
@@ -384,13 +385,17 @@ class _Resolver:
                 wrong = True
             else:
                 given[argument.name] = argument
-        values = [self._parameter(p, given.get(p.name), call) for p in op.parameters]
+        values = [self._parameter(p, given.get(p.name), call, op) for p in op.parameters]
         if wrong or any(v is None for v in values):
             return None
         return tuple(v for v in values if v is not None)
 
-    def _parameter(self, parameter: Parameter, argument: ast.Argument | None, call: ast.Call) -> ParameterValue | None:
+    def _parameter(
+        self, parameter: Parameter, argument: ast.Argument | None, call: ast.Call, op: Operator
+    ) -> ParameterValue | None:
         if argument is None and parameter.default is None and parameter.type != "tags":
+            if _unknown_arguments(call, op):
+                return None  # one of which may be meant
             message = f"'{call.op}' needs its parameter '{parameter.name}: {parameter.type}'"
             self.reporter.error("LN0105", call.span, message)
             return None
@@ -510,6 +515,11 @@ class _Resolver:
             if name not in self.used:
                 message = f"nothing uses the wire {quote(name)}"
                 self.reporter.warning("LN0108", equation.name_span, message, help="it is left out of the program")
+
+
+def _unknown_arguments(call: ast.Call, op: Operator) -> list[ast.Argument]:
+    """Arguments whose names the operator does not know: LN0103, and what seems to be missing may be one of them."""
+    return [a for a in call.arguments if op.port(a.name) is None and op.parameter(a.name) is None]
 
 
 def _declared_here(op: Operator, span: Span) -> Related:

@@ -5,6 +5,7 @@ The stack is explicit, so no text can exhaust Python's; `Builder` makes the node
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -62,6 +63,7 @@ class _Parser:
         self.broken = tokens.broken
         self.reporter = reporter
         self.builder = Builder(source, tokens, reporter)
+        self.misnamed = _letters_as_names(tokens.items)
         self.stack = _Stack(tables.start)
 
     def run(self) -> File:
@@ -202,6 +204,8 @@ class _Parser:
         if self.reporter.full:
             return
         token = self.tokens[at]
+        if token.text in self.misnamed and at != statement_at:
+            return  # the statement that makes a name of this letter has its message
         end = max(token.end, token.start + 1)
         span = Span(self.source, token.start, min(end, len(self.source.text)) if token.type != END else token.end)
         expected = self._expected()
@@ -288,3 +292,14 @@ class _Parser:
         for token in self.tokens[:at]:
             depth += (token.text == "{") - (token.text == "}")
         return depth > 0
+
+
+def _letters_as_names(tokens: Sequence[Token]) -> set[str]:
+    """The event letters that statements try to define: `L = Lights()`."""
+    heads = ["", *(token.type for token in tokens)]
+    following = [*(token.text for token in tokens[1:]), ""]
+    return {
+        token.text
+        for token, before, after in zip(tokens, heads, following, strict=False)
+        if token.type == "LETTER" and before in ("", NEWLINE) and after in ("=", ":")
+    }

@@ -22,7 +22,7 @@ class PathTracing final : public NetworkRun {
       for (int x = tile.x0; x < tile.x1; ++x) {
         if (tile.stopped()) return;
         const std::uint32_t key = hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)), seed_hash());
-        for_samples(key, tile, tracer, [&](const SampleStream& random) {
+        for_samples(key, tile.first_sample, tile.first_sample + tile.sample_count, tracer, [&](const SampleStream& random) {
           const Vec2 pixel = Vec2(static_cast<float>(x), static_cast<float>(y)) + random.get2(0, kOwn);
           film.add(x, y, random.index(), radiance(tracer, camera().ray(pixel), random));
         });

@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lnc.diagnostics import Diagnostic, InternalError, Related, Reporter
 from lnc.library import Library
@@ -26,6 +27,9 @@ from lnc.passes.typecheck import typecheck
 from lnc.source import SourceFile, Span
 from lnc.syntax import ast
 from lnc.syntax.parse import parse
+
+if TYPE_CHECKING:
+    from lnc.passes.conditions import Formula
 
 SIZE_LIMIT = 256 * 1024
 STAGES = ("parse", "expand_macros", "insert_converters", "schedule")
@@ -141,6 +145,15 @@ def describe_seen(typed: TypedNetwork) -> dict[str, str]:
     from lnc.passes.light_paths import seen_paths
 
     return seen_paths(typed.network, typed.alphabet)
+
+
+def describe_conditions(result: Result) -> dict[str, Formula]:
+    """What a scene must have for operators to carry light, where that is worth a test."""
+    from lnc.passes.conditions import light_conditions, skip_conditions
+
+    assert result.typed is not None and result.schedule is not None
+    alphabet = result.typed.alphabet
+    return skip_conditions(result.schedule, light_conditions(result.typed.network, alphabet), alphabet)
 
 
 def compile_file(path: str, ops: tuple[str, ...] = (), dump: Dump | None = None) -> Result:

@@ -16,6 +16,7 @@ from lnc.driver import (
     Result,
     Unreadable,
     compile_file,
+    describe_conditions,
     describe_paths,
     describe_seen,
     read_source,
@@ -107,13 +108,16 @@ def run_command(arguments: argparse.Namespace) -> int:
 
 def write_cpp(result: Result) -> str:
     """The C++ text of a network that has passed."""
-    from lnc.codegen.view import program_view
+    from lnc.codegen.view import LightView, program_view
     from lnc.codegen.write import write_program
 
     assert result.schedule is not None and result.typed is not None
     paths = describe_paths(result.typed)
     source = result.file.span.source.text
-    return write_program(program_view(result.schedule, source, paths.image or "", describe_seen(result.typed)))
+    light = LightView(
+        paths.image or "", describe_seen(result.typed), describe_conditions(result), result.typed.alphabet
+    )
+    return write_program(program_view(result.schedule, source, light))
 
 
 def _read(arguments: argparse.Namespace) -> tuple[Result | None, int]:

@@ -18,7 +18,7 @@ light    = Lights()
 direct   = Direct(light)
 photons  = ParticleTracer(light, count = 20k, via = S+)
 caustic  = NNDensity(photons)
-pt       = PathTracer(direct + pt)
+pt       = PathTracer(direct + pt, via = D|G)
 both     = direct + caustic
 expect <= L (D|G|S)* E
 """
@@ -34,8 +34,10 @@ light    = Lights()
 emitters = Direct(light)
 spare    = Direct(light)
 R        = PathTracer(emitters + R)
+again    = PathTracer(emitters + again)
+smooth   = NNDensity(ParticleTracer(light, count = 20k, via = D))
 expect <= L (D|G|S)* E
-image    emitters - R - R + spare - spare layers
+image    emitters + R + R - again - smooth + spare - spare layers
 """
 
 
@@ -88,9 +90,10 @@ def test_wires_that_are_subtracted(compiled_network, run_program):
     run = run_program(compiled_network("less", text=DIFFERENCE), SCENE, *SIZE)
     assert run.status == 0, run.stderr
     assert "negative" not in run.stderr
-    assert exr.read(run.picture, "R").max() > 0
+    assert exr.read(run.picture, "smooth").max() > 0
     assert (exr.read(run.picture).sum(axis=-1) == 0).any()
-    assert_adds_up(run.picture, ["emitters", "emitters_"], ("R",))
+    assert_adds_up(run.picture, ["emitters", "R", "emitters_"], ("again", "smooth"))
     assert label(run.picture, "emitters") == "L (D|G) S* E"
-    assert re.fullmatch(r"-2 \(.*L.* E\)", label(run.picture, "R"))
+    assert label(run.picture, "smooth") == "-(L D D S* E)"
+    assert re.fullmatch(r"2 \(.*L.* E\)", label(run.picture, "R"))
     assert {node["name"]: node["rays"] for node in run.stats["nodes"]}["spare"] == 0

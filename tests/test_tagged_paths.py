@@ -24,8 +24,16 @@ any_from = PathTracer(direct, from = small)
 specular = PathTracer(direct, via = S)
 floor_d  = PathTracer(direct, via = D, from = floor)
 mixed    = PathTracer(direct, via = D@floor | S)
-expect <= L (D|G|S)* E
-image  diffuse + on + off + any + any_from + specular + floor_d + mixed layers
+expect L S* E | L (D|G) S* E
+image  direct
+tap    diffuse -> "diffuse.exr"
+tap    on -> "on.exr"
+tap    off -> "off.exr"
+tap    any -> "any.exr"
+tap    any_from -> "any_from.exr"
+tap    specular -> "specular.exr"
+tap    floor_d -> "floor_d.exr"
+tap    mixed -> "mixed.exr"
 """
 
 FROM_THE_LIGHT = """
@@ -35,8 +43,9 @@ light = Lights()
 all   = NNDensity(ParticleTracer(light, count = 20k, via = {all}))
 on    = NNDensity(ParticleTracer(light, count = 20k, via = {on}))
 off   = NNDensity(ParticleTracer(light, count = 20k, via = {off}))
-expect <= L (D|G|S)* E
-image  all + on + off layers
+tap   all -> "all.exr"
+tap   on -> "on.exr"
+tap   off -> "off.exr"
 """
 
 
@@ -45,7 +54,7 @@ def test_steps_of_a_path_tracer(compiled_network, run_program):
     run = run_program(compiled_network("tagged_steps", text=FROM_THE_EYE), SCENE, *SIZE, "--samples", "16")
     assert run.status == 0, run.stderr
     names = ("diffuse", "on", "off", "any", "any_from", "specular", "floor_d", "mixed")
-    layer = {name: exr.read(run.picture, name) for name in names}
+    layer = {name: exr.read(run.picture.with_name(f"{name}.exr")) for name in names}
     for name in names:
         assert layer[name].max() > 0, name
     np.testing.assert_allclose(layer["on"] + layer["off"], layer["diffuse"], rtol=1e-5, atol=1e-7)
@@ -60,7 +69,7 @@ def difference_in_errors(compiled_network, run_program, name: str, **paths: str)
     for seed in range(8):
         run = run_program(program, SCENE, *SIZE, "--samples", "2", "--seed", str(seed))
         assert run.status == 0, run.stderr
-        found.append([exr.read(run.picture, layer).mean() for layer in ("all", "on", "off")])
+        found.append([exr.read(run.picture.with_name(f"{tap}.exr")).mean() for tap in ("all", "on", "off")])
     means = np.mean(found, axis=0)
     assert (means[1:] > 0.02 * means[0]).all()
     differences = np.array(found) @ [-1, 1, 1]

@@ -10,6 +10,11 @@ from lnc.codegen.names import cpp_string, float_literal, unique_names
 from lnc.diagnostics import InternalError
 from lnc.library import POINTS, snake_case
 from lnc.network import ParameterValue, PathValue, Probe, Schedule, ScheduledInput, ScheduledNode, Tap, Term
+from lnc.passes.conditions import Formula
+from lnc.paths.language import EMITTERS, EVENTS, Alphabet
+from lnc.paths.regex import Renderer
+
+LETTER_KINDS = len(EMITTERS) + len(EVENTS)
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,25 @@ class SlotView:
 
 
 @dataclass(frozen=True)
+class NeedView:
+    """A set of letters that a light path needs: by kind, the combinations of tags; and what it is called."""
+
+    letters: tuple[str, ...]
+    noun: str
+
+
+@dataclass(frozen=True)
+class SkipView:
+    """When a node carries no light: if a scene has all needs of none of the alternatives (bit i: needs[i])."""
+
+    flag: str
+    constant: str
+    table: str
+    needs: tuple[NeedView, ...]
+    alternatives: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class NodeView:
     member: str
     type_name: str
@@ -64,6 +88,7 @@ class NodeView:
     fields: tuple[tuple[str, str], ...]
     inputs: tuple[InputView, ...]
     tables: tuple[TableView, ...]
+    skip: str  # the flag that says that the node carries no light; empty: it always may
     receivers: str  # the tags that `to` restricts the wire to; empty: everywhere
     prepares: bool
     name: str
@@ -134,21 +159,33 @@ class ProgramView:
     slots: tuple[SlotView, ...]
     tags: tuple[TagRuleView, ...]
     image_paths: str
+    skips: tuple[SkipView, ...]
+    path_tags: tuple[str, ...]  # numbers of the tags that `skips` tell apart
 
 
-def program_view(schedule: Schedule, source: str, image_paths: str, seen_paths: dict[str, str]) -> ProgramView:
-    """The view of a network.
+@dataclass(frozen=True)
+class LightView:
+    """What is known of a network's light paths.
 
-    `source`: its text. `image_paths`: the picture's light paths; `seen_paths`: those of each wire that has a picture of
-    its own, as the eye sees it.
+    `image_paths`: those of the picture; `seen_paths`: those of each wire that has a picture of its own, as the eye sees
+    it; `conditions`: what a scene must have for operators to carry light, in letters of `alphabet`.
     """
-    return _Builder(schedule, seen_paths).build(source, image_paths)
+
+    image_paths: str
+    seen_paths: dict[str, str]
+    conditions: dict[str, Formula]
+    alphabet: Alphabet
+
+
+def program_view(schedule: Schedule, source: str, light: LightView) -> ProgramView:
+    """The view of a network with the text `source`."""
+    return _Builder(schedule, light).build(source)
 
 
 class _Builder:
-    def __init__(self, schedule: Schedule, seen_paths: dict[str, str]) -> None:
+    def __init__(self, schedule: Schedule, light: LightView) -> None:
         self.schedule = schedule
-        self.seen_paths = seen_paths
+        self.light = light
         wires = [n.identifier for n in schedule.nodes]
         self.members = unique_names(wires)
         self.pulls = unique_names(wires, "pull_", self.members.values())
@@ -156,11 +193,14 @@ class _Builder:
         self.variables = unique_names(wires, "seen_", [*self.members.values(), *self.pulls.values()])
         numbers = [str(i + 1) for i in range(len(schedule.probes))]
         self.probes = list(unique_names(numbers, "probe_", [*self.members.values()]).values())
+        self.flags = unique_names(
+            [n.identifier for n in schedule.nodes if n.name in light.conditions], "skip_", self.members.values()
+        )
         self.by_name = {n.name: n for n in schedule.nodes}
         self.tag_bits = {tag.name: i for i, tag in enumerate(schedule.tags)}
         self.layers: list[LayerView] = []
 
-    def build(self, source: str, image_paths: str) -> ProgramView:
+    def build(self, source: str) -> ProgramView:
         nodes = {n.name: self.node(n) for n in self.schedule.nodes}
         image = self.schedule.image
         emitters_layer = self.result_layers()
@@ -182,7 +222,9 @@ class _Builder:
             has_image=self.schedule.image is not None,
             slots=tuple(slot for n in self.schedule.nodes for slot in self.slots(n)),
             tags=tag_rules(self.schedule.tags),
-            image_paths=image_paths,
+            image_paths=self.light.image_paths,
+            skips=tuple(self.skip(self.by_name[name]) for name in self.light.conditions),
+            path_tags=tuple(str(self.tag_bits[tag]) for tag in self.light.alphabet.tags),
         )
 
     def node(self, n: ScheduledNode) -> NodeView:
@@ -200,6 +242,7 @@ class _Builder:
             ),
             inputs=tuple(argument for i in n.inputs for argument in self.arguments(n, i)),
             tables=tables,
+            skip=self.flags.get(n.identifier, ""),
             receivers="" if n.receivers is None else self.tag_set(n.receivers),
             prepares=n.prepares,
             name=n.name,
@@ -210,6 +253,23 @@ class _Builder:
             file=PurePath(n.file).name,
         )
 
+    def skip(self, n: ScheduledNode) -> SkipView:
+        """The condition of a node as tables; one too long for them becomes "always"."""
+        formula = self.light.conditions[n.name]
+        sets = sorted({letters for way in formula for letters in way})
+        if len(sets) > 64:
+            sets, formula = [], ((),)
+        renderer = Renderer(self.light.alphabet)
+        count = self.light.alphabet.combinations
+        kinds = [[hex(letters >> (i * count) & (1 << count) - 1) for i in range(LETTER_KINDS)] for letters in sets]
+        return SkipView(
+            flag=self.flags[n.identifier],
+            constant=self.constants[n.identifier],
+            table=f"k_{self.flags[n.identifier]}",
+            needs=tuple(NeedView(tuple(k), renderer.noun(s)) for k, s in zip(kinds, sets, strict=True)),
+            alternatives=tuple(hex(sum(1 << sets.index(letters) for letters in way)) for way in formula),
+        )
+
     def field(self, n: ScheduledNode, p: ParameterValue) -> str:
         """The C++ initialiser of a parameter."""
         value = p.value
@@ -217,7 +277,7 @@ class _Builder:
         if kind == "tags":
             return "ln::kAnyTag" if value is None else self.tag_set(str(value))
         if kind == "text" and p.name == "layer":
-            return str(self.layer(str(value), self.seen_paths.get(n.name, "")))
+            return str(self.layer(str(value), self.light.seen_paths.get(n.name, "")))
         if kind == "text":
             return cpp_string(str(value))
         if kind == "choice":
@@ -282,13 +342,13 @@ class _Builder:
             weights = _merged(image.terms)
             for wire, weight in weights.items():
                 term = TermView(self.variables[self.by_name[wire].identifier], _factor(abs(weight)))
-                self.layer(wire, _weighted(weight, self.seen_paths[wire]), (term,))
+                self.layer(wire, _weighted(weight, self.light.seen_paths[wire]), (term,))
             name = "emitters"
             while any(name == layer.name for layer in self.layers):
                 name += "_"
             emitters = self.layer(name, "L S* E")
         for tap in self.schedule.taps:
-            paths = " + ".join(_weighted(w, self.seen_paths[wire]) for wire, w in _merged(tap.terms).items())
+            paths = " + ".join(_weighted(w, self.light.seen_paths[wire]) for wire, w in _merged(tap.terms).items())
             paths = paths.replace("+ -", "- ")
             self.layers.append(LayerView(Path(tap.file).stem, paths, self.seen_terms(tap.terms), tap.file))
         return emitters
@@ -328,7 +388,7 @@ class _Builder:
 
     def stored_tap(self, tap: Tap) -> StoredTapView:
         wire = tap.terms[0].node
-        return StoredTapView(self.accessor(wire), wire, self.seen_paths[wire], tap.file)
+        return StoredTapView(self.accessor(wire), wire, self.light.seen_paths[wire], tap.file)
 
     def probe(self, number: int, probe: Probe) -> ProbeView:
         return ProbeView(

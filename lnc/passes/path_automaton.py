@@ -32,10 +32,14 @@ DEPTH_LIMIT = 1000
 
 
 class PathAutomaton:
-    """The automaton of a network. `graph` holds it; wires and results are sets of accepting states of it."""
+    """The automaton of a network. `graph` holds it; wires and results are sets of accepting states of it.
 
-    def __init__(self, network: Network, alphabet: Alphabet) -> None:
+    Unless `bounded`, bounds on the depth of recursions are left out: a program may be started with others.
+    """
+
+    def __init__(self, network: Network, alphabet: Alphabet, bounded: bool = True) -> None:
         self.alphabet = alphabet
+        self._bounded = bounded
         self.nodes = network.by_name()
         self.graph: Graph[Hop] = Graph()
         self.index: dict[State, int] = {}
@@ -158,7 +162,7 @@ class PathAutomaton:
 
     def _entry(self, node: Node, rule: PathRule, content: str, letters: int, left: int | None) -> int | None:
         """Where light enters a rule of an operator; None where its recursion ends."""
-        if node.op.recursion is not None:
+        if node.op.recursion is not None and self._bounded:
             if left == 0:
                 return None
             left = _fewest(None if left is None else left - 1, _steps_after(node))

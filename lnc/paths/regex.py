@@ -268,20 +268,47 @@ class Renderer:
         names: list[str] = []
         area, delta = where[:2]
         if area == delta:
-            names += [f"L{self._where(area)}"] if area else []
+            names += [f"L{self.where(area)}"] if area else []
         else:
             for kind, part in zip(EMITTERS, (area, delta), strict=True):
-                names += [f"L@{kind}" + self._where(part).replace("@", "&")] if part else []
-        names += [f"{event}{self._where(part)}" for event, part in zip(EVENTS, where[2:], strict=True) if part]
+                names += [f"L@{kind}" + self.where(part).replace("@", "&")] if part else []
+        names += [f"{event}{self.where(part)}" for event, part in zip(EVENTS, where[2:], strict=True) if part]
         if letters & self.alphabet.eye:
             names.append("E")
         return names
 
-    def _where(self, combinations: int) -> str:
+    def where(self, combinations: int) -> str:
         """`@t`, `@!t`, `@(t&!u)`, ... or nothing where every combination of tags is meant."""
         if combinations not in self._named:
             self._named[combinations] = self._cover(combinations)
         return self._named[combinations]
+
+    def noun(self, letters: int) -> str:
+        """What a scene has that has one of the letters: `specular surface tagged mirror`, `emitter`, ..."""
+        count = self.alphabet.combinations
+        every = (1 << count) - 1
+        area, delta, *events = (letters >> (i * count) & every for i in range(2 + len(EVENTS)))
+        found: dict[int, list[str]] = {}  # combinations of tags -> what is on them
+        if area == delta:
+            found[area] = ["emitter"]
+        else:
+            found[area] = ["area emitter"]
+            found[delta] = ["point, spot or directional light"]
+        surfaces: dict[int, list[str]] = {}
+        for word, where in zip(("diffuse", "glossy", "specular"), events, strict=True):
+            surfaces.setdefault(where, []).append(word)
+        parts = [f"{what[0]}{self._tagged(where)}" for where, what in found.items() if where]
+        for where, words in surfaces.items():
+            if where:
+                kind = " or ".join(words) if len(words) < len(EVENTS) else "scattering"
+                parts.append(f"{kind} surface{self._tagged(where)}")
+        return " or ".join(parts)
+
+    def _tagged(self, combinations: int) -> str:
+        text = self.where(combinations).removeprefix("@")
+        if text.startswith("!"):
+            return f" not tagged {text[1:]}"
+        return f" tagged {text}" if text else ""
 
     def _cover(self, combinations: int) -> str:
         """Few conjunctions of tags that together give the combinations: the largest that fit, one after the other."""

@@ -40,6 +40,43 @@ BsdfParameters bsdf_parameters(const Material& material, const VertexAttributes&
 
 namespace {
 
+/// What a texture can multiply a factor by. Interpolation rounds, so ranges are a little wider than texels say.
+ColorRange texture_range(const SceneData& data, const TextureRef& ref) {
+  constexpr float kRounding = 1e-5f;
+  if (!ref) return {Vec4(1), Vec4(1)};
+  const ColorRange texels = color_range(data.images[ref.image]);
+  return {texels.low * (1 - kRounding), texels.high * (1 + kRounding)};
+}
+
+}  // namespace
+
+Events possible_events(const SceneData& data, const Material& m) {
+  if (m.unlit) return Events::none;
+  if (!m.has_texture()) {
+    BsdfParameters p;
+    p.base_color = m.base_color;
+    p.metallic = m.metallic;
+    p.roughness = m.roughness;
+    p.specular = m.specular;
+    p.specular_color = m.specular_color;
+    p.ior = m.ior;
+    p.transmission = m.transmission;
+    p.solid = m.solid;
+    return Bsdf(p, true).events();
+  }
+  const ColorRange surface = texture_range(data, m.metallic_roughness_texture);
+  const ColorRange transmission = texture_range(data, m.transmission_texture), specular = texture_range(data, m.specular_texture);
+  Events events = Events::none;
+  if (m.metallic * surface.low.z < 1 && m.transmission * transmission.low.x < 1 && !is_black(m.base_color)) events = Events::D;
+  if (m.metallic * surface.high.z > 0 || m.transmission * transmission.high.x > 0 || m.specular * specular.high.w > 0) {
+    if (m.roughness * surface.low.y < kMinRoughness) events = events | Events::S;
+    if (m.roughness * surface.high.y >= kMinRoughness) events = events | Events::G;
+  }
+  return events;
+}
+
+namespace {
+
 /// The direction in which texture coordinate u grows over the triangle; zero if the mapping is degenerate.
 Vec4 tangent_from_uvs(const SceneData& data, const TextureRef& ref, std::uint32_t triangle, const Vec3& normal) {
   const auto& uvs = data.uvs[ref.uv_set];

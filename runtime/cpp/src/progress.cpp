@@ -142,6 +142,17 @@ void say(std::string_view kind, std::string_view message) {
 void note(std::string_view message) { say("note", message); }
 void warning(std::string_view message) { say("warning", message); }
 
+void note_skipped(std::string_view node, std::string_view reason) {
+  {
+    const std::lock_guard lock(mutex);
+    if (present && present->form_ == Progress::Form::json) {
+      put("{\"event\": \"skipped\", \"node\": " + quoted(node) + ", \"reason\": " + quoted(reason) + "}\n");
+      return;
+    }
+  }
+  note(std::string(node) + ": skipped, " + std::string(reason));
+}
+
 void report_error(std::string_view program, std::string_view message) {
   {
     const std::lock_guard lock(mutex);

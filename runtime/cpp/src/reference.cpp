@@ -4,6 +4,7 @@
 #include <glm/common.hpp>
 #include <optional>
 
+#include "ln/letters.hpp"
 #include "ln/reference_paths.hpp"
 #include "ln/run.hpp"
 
@@ -53,13 +54,14 @@ struct Splat {
 
 class ReferencePaths {
  public:
-  ReferencePaths(const Scene& scene, const PathLanguage& language) : scene_(scene), language_(language), emitters_(scene, language) {}
+  ReferencePaths(const Scene& scene, const PathLanguage& language) : scene_(scene), language_(language), emitters_(scene, language) {
+    has_specular_beginnings_ =
+        letters_of(scene, {}).kinds[LetterSet::specular] != 0 &&
+        std::any_of(emitters_.all().begin(), emitters_.all().end(), [](const EmitterClass& c) { return c.delta; });
+  }
 
   /// Are there paths L@delta S ...?
-  bool has_specular_beginnings() const {
-    if (!any(scene_.events() & Events::S)) return false;
-    return std::any_of(emitters_.all().begin(), emitters_.all().end(), [](const EmitterClass& c) { return c.delta; });
-  }
+  bool has_specular_beginnings() const { return has_specular_beginnings_; }
 
   /// One sample of the radiance along a camera ray, but for what particles bring to the camera.
   Color radiance(Tracer& tracer, Ray ray, Random& random) const {
@@ -206,6 +208,7 @@ class ReferencePaths {
   const Scene& scene_;
   const PathLanguage& language_;
   EmitterClasses emitters_;
+  bool has_specular_beginnings_ = false;
 };
 
 class ReferenceProgram final : public NetworkRun {

@@ -138,10 +138,22 @@ void NetworkRun::build(RunContext& context) {
     const bool first = i == 0 || tags_[i - 1].tag != tag;
     if (first && scene_->tag_matches(tag) == 0) warning("LN0501: tag " + std::string(tags_[i].name) + " matches nothing in this scene");
   }
+  skip_dark_nodes();
   seed_hash_ = hash32(static_cast<std::uint32_t>(context.options.seed), static_cast<std::uint32_t>(context.options.seed >> 32));
   prepare_context_.emplace(*scene_, context.workers, context.options.seed, program_.nodes.size());
   prepare_seconds_.assign(program_.nodes.size(), 0);
   for (int i = 0; i < context.workers.count(); ++i) tracers_.emplace_back(*scene_, program_.nodes.size(), program_.layers.size());
+}
+
+void NetworkRun::skip_dark_nodes() {
+  skipped_.resize(program_.nodes.size());
+  if (program_.skip_rules.empty()) return;
+  const LetterSet letters = letters_of(*scene_, program_.path_tags);
+  for (const SkipRule& rule : program_.skip_rules) {
+    std::optional<std::string>& reason = skipped_[rule.node] = skip_reason(rule, letters);
+    if (rule.skipped) *rule.skipped = reason.has_value();
+    if (reason) note_skipped(program_.nodes[rule.node].name, *reason);
+  }
 }
 
 void NetworkRun::prepare(RunContext& context) {
@@ -211,6 +223,7 @@ void NetworkRun::collect(Stats& stats) {
     node.name = program_.nodes[i].name;
     node.op = program_.nodes[i].op;
     node.rays = sum.total;
+    if (!skipped_.empty()) node.skipped = skipped_[i];
     node.seconds = (prepare_seconds_.empty() ? 0 : prepare_seconds_[i]) + shares[i] * stats.seconds.render;
     stats.nodes.push_back(std::move(node));
   }

@@ -92,24 +92,6 @@ TagSet tags_of_light(const PunctualLight& light, std::span<const TagRule> rules)
   return tags;
 }
 
-/// Events that a material can scatter by anywhere: textures may lower each factor to zero, never raise it.
-Events possible_events(const Material& m) {
-  if (m.unlit) return Events::none;
-  if (!m.has_texture()) {
-    BsdfParameters p;
-    p.base_color = m.base_color;
-    p.metallic = m.metallic;
-    p.roughness = m.roughness;
-    p.specular = m.specular;
-    p.specular_color = m.specular_color;
-    p.ior = m.ior;
-    p.transmission = m.transmission;
-    p.solid = m.solid;
-    return Bsdf(p, true).events();
-  }
-  return Events::all;
-}
-
 }  // namespace
 
 Scene::Scene(SceneData data, std::span<const TagRule> tags, int threads, const Image* environment)
@@ -131,7 +113,6 @@ Scene::Scene(SceneData data, std::span<const TagRule> tags, int threads, const I
   for (std::size_t i = 0; i < data_.parts.size(); ++i) {
     const Part& part = data_.parts[i];
     const Material& m = data_.materials[part.material];
-    events_ = events_ | possible_events(m);
     part_tags_.push_back(tags_of_part(data_, part, tags));
     const bool absorbs = m.solid && std::isfinite(m.attenuation_distance);
     baked_[i].uniform = m.unlit || (!m.has_texture() && !part.has_colors);

@@ -36,6 +36,9 @@ float coverage(const SceneData& data, std::uint32_t triangle, float u, float v);
 /// Parameters of the BSDF at a point.
 BsdfParameters bsdf_parameters(const Material& material, const VertexAttributes& at, bool has_colors);
 
+/// Events that a material may scatter by somewhere, from the ranges of its textures: never too few.
+Events possible_events(const SceneData& data, const Material& material);
+
 /// The normal of KHR_materials normal maps in world space, or `normal` where there is none. `normal`: the interpolated
 /// normal of the front side.
 Vec3 mapped_normal(const SceneData& data, const Material& material, const VertexAttributes& at, std::uint32_t triangle, const Vec3& normal);

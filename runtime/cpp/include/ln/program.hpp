@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "ln/letters.hpp"
 #include "ln/options.hpp"
 #include "ln/render_passes.hpp"
 
@@ -79,6 +80,8 @@ struct ProgramInfo {
   std::span<const TapInfo> taps = {};
   std::span<const ProbeInfo> probes = {};
   bool has_image = true;
+  std::span<const SkipRule> skip_rules = {};
+  std::span<const int> path_tags = {};  // numbers of the tags that the letters of skip_rules tell apart
 
   /// Are there camera rays?
   bool uses_camera() const { return has_image || !layers.empty(); }

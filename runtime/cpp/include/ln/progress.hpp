@@ -17,6 +17,9 @@ namespace ln {
 void note(std::string_view message);
 void warning(std::string_view message);
 
+/// "note: caustic: skipped, REASON"; with --progress json an event of its own.
+void note_skipped(std::string_view node, std::string_view reason);
+
 /// The last line of a program that failed: "network: error: ...".
 void report_error(std::string_view program, std::string_view message);
 
@@ -52,6 +55,7 @@ class Progress {
 
   enum class Form : std::uint8_t { bar, plain, json, none };
   friend void say(std::string_view kind, std::string_view message);
+  friend void note_skipped(std::string_view node, std::string_view reason);
   friend void report_error(std::string_view program, std::string_view message);
   friend void progress_heartbeat();
 

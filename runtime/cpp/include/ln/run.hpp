@@ -85,6 +85,8 @@ class NetworkRun : public RunCallbacks {
 
  private:
   void write_pictures(const Film& film) const;
+  /// Finds the operators that carry no light in this scene, says so, and has the network leave them out.
+  void skip_dark_nodes();
 
   const ProgramInfo& program_;
   std::span<const TagRule> tags_;
@@ -98,6 +100,7 @@ class NetworkRun : public RunCallbacks {
   std::unique_ptr<Scene> scene_;
   std::optional<PrepareContext> prepare_context_;
   std::vector<double> prepare_seconds_;
+  std::vector<std::optional<std::string>> skipped_;  // by node: why
   std::vector<Tracer> tracers_;
   std::vector<Probe> probes_;
   std::optional<NodeSampler> sampler_;

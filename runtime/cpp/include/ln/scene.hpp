@@ -90,12 +90,12 @@ class Scene {
   std::unique_ptr<Emitters> selected_emitters(const EmitterSelection& selection, bool with_environment) const;
   /// Bit t is set if the part matches tag t of the network.
   TagSet part_tags(std::uint32_t part) const { return part_tags_[part]; }
+  /// The same of a punctual light.
+  TagSet light_tags(std::uint32_t light) const { return light_tags_[light]; }
   /// The same for a punctual light.
   TagSet light_tags(std::size_t light) const { return light_tags_[light]; }
   /// Number of parts and lights that match tag `t`.
   int tag_matches(int t) const;
-  /// Events that some surface of the scene can scatter by (conservative: from the ranges of textures).
-  Events events() const { return events_; }
 
   /// Position, error bound and geometric normal at a hit.
   LN_INLINE void locate(const Hit& hit, SurfacePosition& at) const {
@@ -126,7 +126,6 @@ class Scene {
   std::vector<TagSet> part_tags_, light_tags_;
   const Image* environment_;
   std::unique_ptr<Emitters> emitters_;
-  Events events_ = Events::none;
 };
 
 LN_INLINE Interaction::Interaction(const Scene& scene, const Ray& ray, const Hit& found)

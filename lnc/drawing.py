@@ -14,7 +14,7 @@ from lnc.graph import strong_components
 from lnc.network import Network
 from lnc.passes.check_cycles import wire_sources
 
-CHARACTER = 7.2  # width of one in the label font, bold
+CHARACTER = 7.6  # width of one in the label font, bold
 ROW = 15
 GAP_X, GAP_Y, MARGIN = 70, 26, 20
 BEND = "bend"

@@ -20,9 +20,13 @@ Scalar = int | float | bool | str
 
 @dataclass(frozen=True)
 class Representation:
-    """How illumination is stored on a wire. `taps`: the suffixes of the files that a tap can write it as."""
+    """How illumination is stored on a wire.
+
+    `pulled`: it is not, but found out for each request. `taps`: the suffixes of the files that a tap can write it as.
+    """
 
     name: str
+    pulled: bool
     taps: tuple[str, ...]
     doc: str
     span: Span = field(compare=False, repr=False)
@@ -30,10 +34,11 @@ class Representation:
 
 @dataclass(frozen=True)
 class Port:
-    """An input. `complete`: must be whole before it is read (pushed); others are pulled on request."""
+    """An input. `complete`: must be whole before it is read (pushed). `pulled`: answers requests."""
 
     name: str
     representation: str
+    pulled: bool
     complete: bool
     variadic: bool
     doc: str
@@ -90,6 +95,7 @@ class Operator:
     doc: str
     ports: tuple[Port, ...]
     output: str
+    pulled: bool  # the output answers requests
     parameters: tuple[Parameter, ...]
     paths: tuple[PathRule, ...]
     bias: float

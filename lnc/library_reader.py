@@ -56,8 +56,8 @@ def read_library(texts: dict[str, str]) -> tuple[Library, list[Diagnostic]]:
         file = parse(SourceFile(path, text.replace("\r\n", "\n")), reporter)
         for statement in file.statements:
             match statement:
-                case ast.RepresentationDeclaration(name, taps, doc):
-                    representations[name] = Representation(name, taps, doc, statement.span)
+                case ast.RepresentationDeclaration(name, pulled, taps, doc):
+                    representations[name] = Representation(name, pulled, taps, doc, statement.span)
                 case ast.OperatorDeclaration():
                     declared.append((Path(path), statement))
                 case _:
@@ -110,7 +110,11 @@ class _OperatorReader:
         for name in (declaration.output, *(p.representation for p in declaration.ports)):
             if name not in self.representations:
                 self._error(declaration.name_span, f"'{declaration.name}' uses '{name}', which no file declares")
-        ports = tuple(Port(p.name, p.representation, p.complete, p.variadic, p.doc, p.span) for p in declaration.ports)
+        pulled = {name for name, representation in self.representations.items() if representation.pulled}
+        ports = tuple(
+            Port(p.name, p.representation, p.representation in pulled, p.complete, p.variadic, p.doc, p.span)
+            for p in declaration.ports
+        )
         body = declaration.body
         parameters = tuple(self._parameter(i) for i in body if isinstance(i, ast.ParameterDeclaration))
         converter = next((i for i in body if isinstance(i, ast.ConverterDeclaration)), None)
@@ -132,6 +136,7 @@ class _OperatorReader:
             doc=declaration.doc,
             ports=ports,
             output=declaration.output,
+            pulled=declaration.output in pulled,
             parameters=parameters,
             paths=tuple(rules),
             bias=sum(self._number(i.bound, "ratio") for i in body if isinstance(i, ast.BiasDeclaration)),

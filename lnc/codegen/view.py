@@ -83,7 +83,7 @@ class SkipView:
 class NodeView:
     member: str
     type_name: str
-    pull: str  # empty unless the node's wire is Points
+    pull: str  # empty unless the node's wire answers requests
     constant: str
     fields: tuple[tuple[str, str], ...]
     inputs: tuple[InputView, ...]
@@ -233,7 +233,7 @@ class _Builder:
         return NodeView(
             member=self.members[n.identifier],
             type_name=f"ln::ops::{n.op.name}" + (f"<{arguments}>" if tables else ""),
-            pull=self.pulls[n.identifier] if n.op.output == POINTS else "",
+            pull=self.pulls[n.identifier] if n.op.pulled else "",
             constant=self.constants[n.identifier],
             fields=tuple(
                 (p.name, self.field(n, p))
@@ -309,14 +309,14 @@ class _Builder:
 
     def arguments(self, n: ScheduledNode, i: ScheduledInput) -> list[InputView]:
         """One argument, or one a term for a variadic port."""
-        if i.port.representation == POINTS:
+        if i.port.representation != POINTS and (len(i.terms) != 1 or i.terms[0].weight != 1):
+            raise InternalError(f"a sum of {i.port.representation} at port {i.port.name}")
+        if i.port.pulled:
             terms = self.terms(i.terms)
             functor = f"{self.members[n.identifier]}_{i.port.name}"
             if i.port.variadic:
                 return [InputView((t,), "", f"{functor}_{k}") for k, t in enumerate(terms)]
             return [InputView(terms, "", functor)]
-        if len(i.terms) != 1 or i.terms[0].weight != 1:
-            raise InternalError(f"a sum of {i.port.representation} at port {i.port.name}")
         return [InputView((), self.accessor(i.terms[0].node))]
 
     def accessor(self, wire: str) -> str:

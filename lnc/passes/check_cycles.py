@@ -45,11 +45,15 @@ def wire_sources(node: Node) -> list[str]:
 
 
 def _pushed_edge(nodes: dict[str, Node], component: Iterable[str], members: set[str]) -> tuple[str, str] | None:
-    """An edge of the cycle into an operator that reads it before the picture."""
+    """An edge of the cycle into an operator that reads it before the picture.
+
+    One that prepares and bounds recursion may read itself while it does, from a port that is pulled.
+    """
     for name in component:
         node = nodes[name]
+        prepares = node.op.prepares and node.op.recursion is None
         for given in node.inputs:
-            if given.port.complete or (node.op.prepares and not any(p.complete for p in node.op.ports)):
+            if given.port.complete or (prepares and not any(p.complete for p in node.op.ports)):
                 for term in given.terms:
                     if term.node in members:
                         return name, term.node

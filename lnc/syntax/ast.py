@@ -284,6 +284,7 @@ class Macro(Record):
 
 class RepresentationDeclaration(Record):
     name: str
+    pulled: bool
     taps: tuple[str, ...]
     doc: str
     comments: Comments

@@ -273,9 +273,11 @@ class Builder:
     # --- Declarations -------------------------------------------------------------------------------------------------
 
     def representation(self, span: Span, children: Children) -> ast.RepresentationDeclaration:
-        name, *taps = children
-        suffixes = tuple(self._unescape(suffix) for suffix in taps)
-        return ast.RepresentationDeclaration(name.text, suffixes, self._doc(span.start), self._comments(span), span)
+        name, *rest = children
+        pulled = bool(rest) and rest[0].type == "PULLED"
+        taps = tuple(self._unescape(suffix) for suffix in rest[pulled:])
+        doc, comments = self._doc(span.start), self._comments(span)
+        return ast.RepresentationDeclaration(name.text, pulled, taps, doc, comments, span)
 
     def operator(self, span: Span, children: Children) -> ast.OperatorDeclaration:
         name, *rest, brace = children

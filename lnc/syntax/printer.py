@@ -89,8 +89,9 @@ def _statement(statement: ast.Statement | ast.OperatorItem) -> tuple[str, str, s
             return "use", _text(file), "", ()
         case ast.Macro():
             return _macro(statement)
-        case ast.RepresentationDeclaration(name, taps):
-            written = f"{name} tap {', '.join(_text(suffix) for suffix in taps)}" if taps else name
+        case ast.RepresentationDeclaration(name, pulled, taps):
+            written = name + (" pulled" if pulled else "")
+            written += f" tap {', '.join(_text(suffix) for suffix in taps)}" if taps else ""
             return "representation", written, "", ()
         case ast.OperatorDeclaration():
             return _operator(statement)

@@ -14,7 +14,7 @@ struct Gather {
 
   template <class Request, class In>
   LN_INLINE Color answer(Request& request, const In& in) const {
-    if (samples > 1) return many(request, in);
+    if (samples > 1 && !request.sample_given()) return many(request, in);
     const BsdfRay* ray = request.bsdf_ray(node);
     if (!ray || !ray->hit.found()) return Color(0);
     return secondary_light<Via>(request.tracer(), request.random(), *ray, request.beta(), request.depth(), from, in);

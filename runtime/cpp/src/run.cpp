@@ -140,7 +140,7 @@ void NetworkRun::build(RunContext& context) {
   }
   skip_dark_nodes();
   seed_hash_ = hash32(static_cast<std::uint32_t>(context.options.seed), static_cast<std::uint32_t>(context.options.seed >> 32));
-  prepare_context_.emplace(*scene_, context.workers, context.options.seed, program_.nodes.size());
+  prepare_context_.emplace(*scene_, context.workers, context.options.seed, program_.nodes.size(), View{camera_, size_.width, size_.height});
   prepare_seconds_.assign(program_.nodes.size(), 0);
   for (int i = 0; i < context.workers.count(); ++i) tracers_.emplace_back(*scene_, program_.nodes.size(), program_.layers.size());
 }

@@ -28,6 +28,7 @@ class CameraRays {
     down_ = -camera.up * step;
     corner_ = -0.5f * (static_cast<float>(width) * right_ + static_cast<float>(height) * down_);
     forward_ = camera.forward;
+    height_ = 2 * half_height;
   }
 
   /// The ray through `pixel` (x to the right, y down, in pixels; (0, 0) is the corner of the picture).
@@ -49,8 +50,12 @@ class CameraRays {
     return CameraView{pixel, -d / distance, {position_, 0, Vec3(0)}, 1 / (sqr(distance) * cosine * sqr(cosine) * step2)};
   }
 
+  /// Height of what the picture shows at this distance from the eye.
+  float height_at(float distance) const { return orthographic_ ? height_ : height_ * distance; }
+
  private:
   bool orthographic_ = false;
+  float height_ = 2;  // perspective: at distance 1
   Vec3 position_{0}, corner_{0}, right_{1, 0, 0}, down_{0, -1, 0}, forward_{0, 0, -1};
 };
 

@@ -4,21 +4,29 @@
 #include <cstdint>
 #include <vector>
 
+#include "ln/camera.hpp"
 #include "ln/parallel.hpp"
 #include "ln/tracer.hpp"
 
 namespace ln {
 
+/// What the eye looks at: camera rays through a picture of this size.
+struct View {
+  CameraRays rays;
+  int width = 0, height = 0;
+};
+
 /// Access to the scene and to all cores, before the picture.
 class PrepareContext {
  public:
-  PrepareContext(const Scene& scene, Workers& workers, std::uint64_t seed, std::size_t node_count)
-      : scene_(&scene), workers_(&workers), seed_(seed) {
+  PrepareContext(const Scene& scene, Workers& workers, std::uint64_t seed, std::size_t node_count, const View& view = {})
+      : scene_(&scene), workers_(&workers), seed_(seed), view_(view) {
     for (int i = 0; i < workers.count(); ++i) tracers_.emplace_back(scene, node_count, 0);
   }
 
   const Scene& scene() const { return *scene_; }
   std::uint64_t seed() const { return seed_; }
+  const View& view() const { return view_; }
   Workers& workers() { return *workers_; }
 
   /// Calls `work(begin, end, tracer)` for each run of `grain` numbers of [0, n), on all cores. Results must not depend on
@@ -49,6 +57,7 @@ class PrepareContext {
   const Scene* scene_;
   Workers* workers_;
   std::uint64_t seed_;
+  View view_;
   std::vector<Tracer> tracers_;  // one a worker
 };
 

@@ -21,6 +21,7 @@ struct BsdfRay {
 template <Events kReceives, Events kSamples = kReceives>
 class Request {
  public:
+  using Answer = Color;
   static constexpr Events receives = kReceives;
 
   Request(Tracer& tracer, const SampleStream& random, const Interaction& at, const Color& beta, std::uint32_t depth, RayKind kind)
@@ -85,6 +86,17 @@ class Request {
     return valid_ ? &sample_ : nullptr;
   }
 
+  /// Makes `wi` (local) the shared sample. The caller has drawn it with the density of the BSDF; operators that would follow
+  /// several directions follow this one only.
+  void give_sample(const Vec3& wi) {
+    const BsdfValue bsdf = at_.bsdf().evaluate(at_.wo_local, wi, kSamples);
+    const Vec3 direction = at_.frame.to_world(wi);
+    sampled_ = given_ = true;
+    valid_ = bsdf.pdf_w > 0 && at_.side_agrees(direction, wi.z);
+    sample_ = {spawn_ray(at_.at, direction), {}, valid_ ? bsdf.f_cos / bsdf.pdf_w : Color(0), bsdf.pdf_w, Events::D};
+  }
+  bool sample_given() const { return given_; }
+
   /// Another sample, of what the receiver scatters, drawn with the numbers of `random` and traced at the cost of `node`.
   /// False: nothing is scattered.
   bool trace_sample(const SampleStream& random, NodeId node, BsdfRay& sample) {
@@ -114,7 +126,7 @@ class Request {
   Color beta_;
   std::uint32_t depth_;
   RayKind kind_;
-  bool sampled_ = false, valid_ = false, traced_ = false;
+  bool sampled_ = false, valid_ = false, traced_ = false, given_ = false;
   union {
     BsdfRay sample_;  // if sampled_
   };

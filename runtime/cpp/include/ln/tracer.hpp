@@ -28,10 +28,16 @@ struct NodeCost {
   }
 };
 
+/// Calls in progress of a node that may call itself; what they are for is up to the node.
+struct Recursion {
+  int depth = 0;
+  void* purpose = nullptr;
+};
+
 class Tracer {
  public:
   Tracer(const Scene& scene, std::size_t node_count, std::size_t layer_count)
-      : scene_(&scene), costs_(node_count), layers_(layer_count, Color(0)) {}
+      : scene_(&scene), costs_(node_count), recursions_(node_count), layers_(layer_count, Color(0)) {}
 
   const Scene& scene() const { return *scene_; }
 
@@ -50,6 +56,8 @@ class Tracer {
   /// Values of the picture's layers for the sample being computed.
   std::vector<Color>& layers() { return layers_; }
 
+  Recursion& recursion(NodeId node) { return recursions_[node]; }
+
   /// Says which node works from now on, for whoever samples `present_node`: one store.
   void enter(NodeId node) { __atomic_store_n(&present_node_, node, __ATOMIC_RELAXED); }
   NodeId present_node() const { return __atomic_load_n(&present_node_, __ATOMIC_RELAXED); }
@@ -61,6 +69,7 @@ class Tracer {
  private:
   const Scene* scene_;
   std::vector<NodeCost> costs_;
+  std::vector<Recursion> recursions_;
   std::vector<Color> layers_;
   std::unique_ptr<SampleBlock> samples_ = std::make_unique<SampleBlock>();
   NodeId present_node_ = kIdle;

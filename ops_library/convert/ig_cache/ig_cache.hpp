@@ -1,0 +1,124 @@
+#pragma once
+
+#include "ln/hemisphere_request.hpp"
+#include "ln/operator.hpp"
+
+namespace ln::ops {
+
+/// Irradiance records, made before the picture where the eye will want them; see ig_cache.ln.
+struct IGCache {
+  NodeId node;
+  float error = 0.2f;
+  float closest = 0.02f, farthest = 0.15f;
+  std::int64_t bounces = 6;
+
+  void prepare(PrepareContext& context, const auto& samples) {
+    key_ = hash32(hash32(static_cast<std::uint32_t>(context.seed()), static_cast<std::uint32_t>(context.seed() >> 32)), node);
+    seen_ = IrradianceRecords({error, closest, farthest});
+    beyond_ = IrradianceRecords({kCoarserError * error, kCoarser * closest, kCoarser * farthest});
+    solve_beyond(context, samples);
+    cover_seen(context, samples);
+  }
+
+  template <class Visit>
+  void answer(RecordRequest<Visit>& request, const auto& samples) const {
+    const Interaction& at = request.at();
+    const Recursion& recursion = request.tracer().recursion(node);
+    if (recursion.purpose) {
+      static_cast<std::vector<Receiver>*>(recursion.purpose)->push_back({at.hit, at.front, at.at.p, at.frame.n, 0});
+      return;
+    }
+    // What lies between the pixels that were looked at before the picture may be farther from a record than is allowed.
+    const IrradianceRecords& records = recursion.depth > 0 ? beyond_ : seen_;
+    for (const float limit : {IrradianceRecords::kOverlap, IrradianceRecords::kFar})
+      if (records.visit(at.at.p, at.frame.n, limit, request.visit)) return;
+    if (recursion.depth > 0) {
+      if (!beyond_.empty()) request.visit(ambient_, 1);
+      return;
+    }
+    const std::uint32_t key = hash32(request.random().bits(request.depth(), kRoulette));
+    const Receiver where{at.hit, at.front, at.at.p, at.frame.n};
+    request.visit(IrradianceRecord{where.p, where.n, 0, sample(request.tracer(), where, key, 1, samples)}, 1);
+  }
+
+ private:
+  // Records that the eye does not see: wider apart, less exact, made from fewer directions.
+  static constexpr float kCoarser = 4, kCoarserError = 2, kBeyondShare = 0.25f;
+  // Where they are wanted is found from about so many pixels, then from the records found so far.
+  static constexpr float kProbes = 1024, kProbeShare = 1.0f / 32;
+  static constexpr int kGenerations = 4;
+  static constexpr int kWidestStride = 16;  // [pixels]
+
+  /// Samples at a receiver; requests that come back to this node meanwhile are one level deeper. With `wanted`, they are noted
+  /// there and answered by darkness.
+  LN_NOINLINE IrradianceSample sample(Tracer& tracer, const Receiver& where, std::uint32_t key, float share, const auto& samples,
+                                      std::vector<Receiver>* wanted = nullptr) const {
+    Recursion& recursion = tracer.recursion(node);
+    const Recursion before = recursion;
+    recursion = {before.depth + 1, wanted};
+    HemisphereRequest request(tracer, where, key, share);
+    const IrradianceSample result = samples(request);
+    recursion = before;
+    return result;
+  }
+
+  /// Places where this node is asked for light, when it makes samples at `origins` (few directions each). Answered by darkness.
+  std::vector<Receiver> asked_from(PrepareContext& context, const std::vector<Receiver>& origins, const auto& samples) const {
+    std::vector<std::vector<Receiver>> wanted(origins.size());
+    context.for_chunks(origins.size(), 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
+      for (std::size_t i = begin; i < end; ++i) {
+        sample(tracer, origins[i], hash32(key_, static_cast<std::uint32_t>(i)), kProbeShare, samples, &wanted[i]);
+        for (Receiver& place : wanted[i]) place.footprint = origins[i].footprint + context.view().rays.height_at(place.hit.t);
+      }
+    });
+    std::vector<Receiver> all;
+    for (const auto& some : wanted) all.insert(all.end(), some.begin(), some.end());
+    return all;
+  }
+
+  /// Irradiance at surfaces that the eye does not see, where this node feeds itself: the fixed point of one more bounce. Each round
+  /// follows the same directions, so rounds differ by the light of one more bounce only.
+  void solve_beyond(PrepareContext& context, const auto& samples) {
+    const View& view = context.view();
+    const int stride = 1 + static_cast<int>(std::sqrt(static_cast<float>(view.width) * static_cast<float>(view.height) / kProbes));
+    std::vector<Receiver> origins = seen_receivers(
+        context, node, [&](int x, int y) { return x % stride == 0 && y % stride == 0; }, [](const Receiver&) { return true; });
+    std::vector<Receiver> places;
+    for (int generation = 0; generation < kGenerations && !origins.empty(); ++generation) {
+      origins = cover(context, beyond_, asked_from(context, origins, samples), key_,
+                      [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
+                        std::vector<Receiver> ignored;
+                        return sample(tracer, where, key, kBeyondShare, samples, &ignored);
+                      });
+      places.insert(places.end(), origins.begin(), origins.end());
+    }
+    BounceSeries series(beyond_);
+    const auto with_bounces_so_far = [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
+      return sample(tracer, where, key, kBeyondShare, samples);
+    };
+    for (std::int64_t round = 1; round < bounces && !series.converged(); ++round) series.add(context, places, key_, with_bounces_so_far);
+    series.add_remaining();
+    ambient_.sample.irradiance = beyond_.mean_irradiance();
+  }
+
+  /// Records where the eye sees surfaces, from a wide grid of pixels to all of them.
+  void cover_seen(PrepareContext& context, const auto& samples) {
+    for (int stride = kWidestStride; stride > 0; stride /= 2) {
+      const auto on_grid = [](int x, int y, int width) { return x % width == 0 && y % width == 0; };
+      std::vector<Receiver> wanted = seen_receivers(
+          context, node, [&](int x, int y) { return on_grid(x, y, stride) && (stride == kWidestStride || !on_grid(x, y, 2 * stride)); },
+          [&](const Receiver& r) { return !seen_.covers(r.p, r.n); });
+      cover(context, seen_, std::move(wanted), key_ + 1, [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
+        return sample(tracer, where, key, 1, samples);
+      });
+    }
+  }
+
+ public:
+  // State.
+  std::uint32_t key_ = 0;
+  IrradianceRecords seen_{}, beyond_{};
+  IrradianceRecord ambient_{};  // where there is no record beyond
+};
+
+}  // namespace ln::ops

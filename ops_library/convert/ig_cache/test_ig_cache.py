@@ -1,0 +1,52 @@
+"""IGCache: its octree and its series of bounces (in C++); the same bits with any number of threads; what it costs."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from benchmarks import exr
+
+SCENES = Path(__file__).resolve().parents[3] / "examples" / "scenes"
+FEW = ("--set", "samples.samples=64")
+
+
+@pytest.fixture
+def run(compiled_network, run_program):
+    def run(scene, *options):
+        done = run_program(compiled_network("irradiance_gradients"), SCENES / scene, *options)
+        assert done.status == 0, done.stderr
+        return exr.read(done.picture), done.stats["rays"]
+
+    return run
+
+
+def test_known_answers(runtime_tool):
+    done = subprocess.run([runtime_tool("test_irradiance_records")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_seed_decides_not_the_threads(run):
+    options = ("--size", "40x30", "--samples", "2", *FEW)
+    pictures = [run("mirror_glass.glb", *options, "--threads", str(n))[0] for n in (1, 2, 5)]
+    assert (pictures[0] == pictures[1]).all()
+    assert (pictures[0] == pictures[2]).all()
+    assert (pictures[0] != run("mirror_glass.glb", *options, "--seed", "1")[0]).any()
+
+
+def test_cost_hardly_depends_on_the_size_of_the_picture(run):
+    """Rays of the records alone: those of the picture are left out by its one sample a pixel."""
+    small, large = (
+        run("cornell_box.gltf", "--size", size, "--samples", "1", *FEW)[1]["gather"] for size in ("80x60", "160x120")
+    )
+    assert large < 1.5 * small
+
+
+def test_bounces_are_a_series(run):
+    """Two rounds and the rest of the series give what eight give: in the box each further bounce is weaker by half."""
+    means = [
+        run("closed_box.gltf", "--size", "20x15", "--samples", "16", *FEW, "--set", f"records.bounces={n}")[0].mean()
+        for n in (1, 2, 8)
+    ]
+    assert means[1] == pytest.approx(means[2], rel=0.02)
+    assert means[0] < 0.97 * means[2]

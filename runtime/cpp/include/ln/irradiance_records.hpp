@@ -1,0 +1,153 @@
+#pragma once
+// Irradiance records in an octree, and their creation where they are missing (Ward, Rubinstein and Clear 1988; Ward and
+// Heckbert 1992).
+
+#include <cstdint>
+#include <vector>
+
+#include "ln/hemisphere.hpp"
+#include "ln/prepare.hpp"
+
+namespace ln {
+
+/// A place where irradiance is wanted: one side of the surface at `hit`.
+struct Receiver {
+  Hit hit;
+  bool front = true;
+  Vec3 p{0}, n{0, 0, 1};  // n: shading normal on that side
+  float footprint = 0;    // height of the picture as it appears there [normalised units]
+};
+
+struct IrradianceRecord {
+  Vec3 p{0}, n{0, 0, 1};
+  float reach = 0;  // distance at which the error of using the record has grown to what is allowed
+  IrradianceSample sample;
+
+  /// Irradiance at a point near the record, extrapolated by its gradients.
+  Color at(const Vec3& point, const Vec3& normal) const {
+    return sample.irradiance + glm::cross(n, normal) * sample.rotation + (point - p) * sample.translation;
+  }
+};
+
+/// How far records reach: the allowed error times the distance of the surroundings, but within bounds.
+struct RecordSpacing {
+  float error = 0.2f;                       // Ward's accuracy a
+  float closest = 0.02f, farthest = 0.15f;  // bounds of the reach, as a share of the picture's height where the record is
+};
+
+class IrradianceRecords {
+ public:
+  IrradianceRecords() = default;
+  explicit IrradianceRecords(const RecordSpacing& spacing) : spacing_(spacing), nodes_(1) {}
+
+  std::size_t size() const { return records_.size(); }
+  bool empty() const { return records_.empty(); }
+  const std::vector<IrradianceRecord>& records() const { return records_; }
+
+  /// Adds a record. Neighbours limit each other: nothing is farther from one than from the other plus the way between them
+  /// (Krivanek et al. 2006, "neighbor clamping").
+  void add(const Receiver& where, const IrradianceSample& sample);
+
+  /// Takes a new value for a record; its reach stays.
+  void set_value(std::size_t index, const IrradianceSample& sample);
+
+  Color mean_irradiance() const;
+
+  /// Is there a record whose error at the point is allowed?
+  bool covers(const Vec3& p, const Vec3& n) const;
+
+  /// Calls `visit(record, weight)` for records near the point, weights falling linearly to 0 with the error (Tabellion and
+  /// Lamorlette 2004). `limit` <= kFar: the error at which they get there, in units of what is allowed. False: there are none.
+  template <class Visit>
+  bool visit(const Vec3& p, const Vec3& n, float limit, Visit&& visit) const {
+    bool any = false;
+    for_near(p, [&](const IrradianceRecord& record) {
+      const float e = error(record, p, n);
+      if (e >= limit) return false;
+      visit(record, 1 - e / limit);
+      any = true;
+      return false;
+    });
+    return any;
+  }
+
+  static constexpr float kOverlap = 1.4f;  // usual limit: neighbouring records overlap, so that no border shows
+  static constexpr float kFar = 3.0f;
+
+ private:
+  struct Node {
+    std::int32_t children[8] = {-1, -1, -1, -1, -1, -1, -1, -1};
+    std::int32_t entry = -1;
+  };
+  struct Entry {
+    std::uint32_t record;
+    std::int32_t next;
+  };
+
+  /// Error of using a record at a point, in units of what is allowed (Ward et al. 1988, eq. 4). Distance from the tangent
+  /// plane counts four times: what lies on another level (steps, table and floor) has other surroundings.
+  float error(const IrradianceRecord& record, const Vec3& p, const Vec3& n) const {
+    const Vec3 d = p - record.p;
+    const float off = 4 * glm::dot(d, record.n + n) * 0.5f;
+    const float turned = safe_sqrt(1 - glm::dot(n, record.n));
+    return std::sqrt(glm::dot(d, d) + off * off) / record.reach + turned / spacing_.error;
+  }
+
+  /// Calls `use(record)` for all records that may reach `p`, until it says true.
+  template <class Use>
+  void for_near(const Vec3& p, Use&& use) const {
+    if (nodes_.empty()) return;
+    Vec3 centre(0);
+    float half = 1;
+    for (std::int32_t node = 0; node >= 0;) {
+      for (std::int32_t e = nodes_[node].entry; e >= 0; e = entries_[e].next)
+        if (use(records_[entries_[e].record])) return;
+      const int octant = (p.x > centre.x) | (p.y > centre.y) << 1 | (p.z > centre.z) << 2;
+      half *= 0.5f;
+      centre += Vec3(octant & 1 ? half : -half, octant & 2 ? half : -half, octant & 4 ? half : -half);
+      node = nodes_[node].children[octant];
+    }
+  }
+
+  void insert(std::uint32_t record, std::int32_t node, const Vec3& centre, float half);
+
+  RecordSpacing spacing_;
+  std::vector<IrradianceRecord> records_;
+  std::vector<Node> nodes_;
+  std::vector<Entry> entries_;
+};
+
+/// Makes a record's sample: the receiver and a key for its random numbers.
+using SampleIrradiance = FunctionRef<IrradianceSample(Tracer&, const Receiver&, std::uint32_t key)>;
+
+/// Adds records until all of `wanted` are covered; returns where, in the order of the records. Batches are chosen by hash and sampled on
+/// all cores with the records so far only read, so that the result does not depend on the number of threads.
+std::vector<Receiver> cover(PrepareContext& context, IrradianceRecords& records, const std::vector<Receiver>& wanted, std::uint32_t key,
+                            SampleIrradiance sample);
+
+/// Records that get their light from each other, bounce after bounce: E_(n+1) = T(direct + E_n). As the same directions are
+/// followed each time, the difference of two rounds is the light of one more bounce, without noise of its own.
+class BounceSeries {
+ public:
+  /// `records` hold the first bounce.
+  explicit BounceSeries(IrradianceRecords& records);
+
+  /// Samples all records anew, with the `key` that they were made with (see `cover`).
+  void add(PrepareContext& context, const std::vector<Receiver>& places, std::uint32_t key, SampleIrradiance sample);
+  /// Is the light of the last bounce negligible?
+  bool converged() const;
+  /// Adds what further bounces bring, as a geometric series.
+  void add_remaining();
+
+ private:
+  IrradianceRecords& records_;
+  std::vector<IrradianceSample> last_;  // what the last bounce brought to each record
+  DVec3 last_sum_{0}, ratio_{0};        // of irradiances: of the last bounce; and its ratio to the one before
+};
+
+/// The diffuse surfaces that the eye sees at the centres of pixels (x, y) which `choose` picks, through specular ones too, in the
+/// order of pixels. Camera rays at the cost of `node`.
+std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, FunctionRef<bool(int x, int y)> choose,
+                                     FunctionRef<bool(const Receiver&)> keep);
+
+}  // namespace ln

@@ -1,0 +1,82 @@
+#include "ln/hemisphere.hpp"
+
+#include <glm/matrix.hpp>
+#include <vector>
+
+namespace ln {
+
+namespace {
+
+/// Unit vector at the azimuth `phi` in the plane of the surface.
+Vec3 towards(const Frame& frame, float phi) { return frame.s * std::cos(phi) + frame.t * std::sin(phi); }
+
+float closer(const HemisphereCell& a, const HemisphereCell& b) { return std::max(std::min(a.distance, b.distance), 1e-6f); }
+
+}  // namespace
+
+HemisphereGrid HemisphereGrid::of(float count) {
+  HemisphereGrid grid;
+  grid.polar = std::max(1, static_cast<int>(std::lround(std::sqrt(count / kPi))));
+  grid.azimuth = std::max(3, static_cast<int>(std::lround(count / static_cast<float>(grid.polar))));
+  return grid;
+}
+
+Vec3 HemisphereGrid::direction(int ring, int sector, const Vec2& u) const {
+  const float sin2 = (static_cast<float>(ring) + u.x) / static_cast<float>(polar);
+  const float phi = 2 * kPi * (static_cast<float>(sector) + u.y) / static_cast<float>(azimuth);
+  const float sin = std::sqrt(sin2);
+  return {sin * std::cos(phi), sin * std::sin(phi), safe_sqrt(1 - sin2)};
+}
+
+IrradianceSample integrate(const HemisphereGrid& grid, std::span<const HemisphereCell> cells, const Frame& frame) {
+  const auto rings = static_cast<std::size_t>(grid.polar), sectors = static_cast<std::size_t>(grid.azimuth);
+  const auto cell = [&](std::size_t ring, std::size_t sector) -> const HemisphereCell& { return cells[ring * sectors + sector]; };
+  const float step = 2 * kPi / static_cast<float>(sectors);
+
+  // What a ring's borders and its inside contribute, at its polar angles theta: sin^2(theta) = ring / rings.
+  struct Ring {
+    float sin, cos2;  // at the border towards the normal
+    float tilt;       // integral of sin^2(theta)
+  };
+  std::vector<Ring> ring_of(rings + 1);
+  const auto area = [](float sin, float cos) { return 0.5f * (std::asin(sin) - sin * cos); };
+  for (std::size_t j = 0; j <= rings; ++j) {
+    const float sin2 = static_cast<float>(j) / static_cast<float>(rings);
+    ring_of[j] = {std::sqrt(sin2), 1 - sin2, area(std::sqrt(sin2), safe_sqrt(1 - sin2))};
+  }
+  for (std::size_t j = 0; j < rings; ++j) ring_of[j].tilt = ring_of[j + 1].tilt - ring_of[j].tilt;
+
+  IrradianceSample result;
+  Color sum(0);
+  float inverse_distance = 0;
+  for (std::size_t k = 0; k < sectors; ++k) {
+    const std::size_t before = (k + sectors - 1) % sectors;
+    const float phi = step * static_cast<float>(k);
+    Color tilt(0), outwards(0), sideways(0);
+    for (std::size_t j = 0; j < rings; ++j) {
+      const HemisphereCell& here = cell(j, k);
+      sum += here.radiance;
+      inverse_distance += 1 / std::max(here.distance, 1e-6f);
+      tilt += here.radiance * ring_of[j].tilt;
+      // A border between two cells belongs to the nearer surface, and moves as that one does (Ward and Heckbert 1992, eq. 2).
+      if (j > 0) {
+        const HemisphereCell& inner = cell(j - 1, k);
+        outwards += (here.radiance - inner.radiance) * (ring_of[j].sin * ring_of[j].cos2 / closer(here, inner));
+      }
+      const HemisphereCell& neighbour = cell(j, before);
+      sideways += (here.radiance - neighbour.radiance) * ((ring_of[j + 1].sin - ring_of[j].sin) / closer(here, neighbour));
+    }
+    const Vec3 middle = towards(frame, phi + 0.5f * step), across = towards(frame, phi + 0.5f * step + 0.5f * kPi);
+    const Vec3 border = towards(frame, phi + 0.5f * kPi);
+    // Integrated over the cell's azimuths, its vector shrinks to the chord.
+    const float chord = 2 * std::sin(0.5f * step);
+    result.rotation += glm::outerProduct(across, tilt) * chord;
+    result.translation += glm::outerProduct(middle, outwards) * step + glm::outerProduct(border, sideways);
+  }
+  const auto count = static_cast<float>(cells.size());
+  result.irradiance = sum * (kPi / count);
+  result.distance = inverse_distance > 0 ? count / inverse_distance : kInfinity;
+  return result;
+}
+
+}  // namespace ln

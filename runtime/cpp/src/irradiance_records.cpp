@@ -1,0 +1,211 @@
+#include "ln/irradiance_records.hpp"
+
+#include <numeric>
+
+#include "ln/request.hpp"
+
+namespace ln {
+
+namespace {
+
+/// Gradients that are steeper than the surroundings allow come from noise, or from something that is very near.
+void limit_gradients(IrradianceSample& sample) {
+  for (int c = 0; c < 3; ++c) {
+    const float steepest = sample.irradiance[c] / sample.distance, found = glm::length(sample.translation[c]);
+    if (found > steepest) sample.translation[c] *= steepest / found;
+  }
+}
+
+/// a + factor * b, but for the distance.
+IrradianceSample combined(const IrradianceSample& a, const Color& factor, const IrradianceSample& b) {
+  IrradianceSample sum = a;
+  sum.irradiance += factor * b.irradiance;
+  for (int c = 0; c < 3; ++c) {
+    sum.rotation[c] += factor[c] * b.rotation[c];
+    sum.translation[c] += factor[c] * b.translation[c];
+  }
+  return sum;
+}
+
+/// Random numbers of record `index`.
+std::uint32_t record_key(std::uint32_t key, std::size_t index) { return hash32(key, static_cast<std::uint32_t>(index)); }
+
+}  // namespace
+
+void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sample) {
+  IrradianceRecord record{where.p, where.n, 0, sample};
+
+  // Where irradiance changes fast, the record reaches less far.
+  const Color E = sample.irradiance;
+  const float slope = glm::length(sample.translation * Vec3(1)), sum = E.x + E.y + E.z;
+  float distance = std::min(sample.distance, slope > 0 ? sum / slope : kInfinity);
+  for_near(record.p, [&](const IrradianceRecord& near) {
+    if (glm::dot(near.n, record.n) > 0.5f) distance = std::min(distance, near.sample.distance + glm::distance(near.p, record.p));
+    return false;
+  });
+  const float low = spacing_.closest * where.footprint, high = spacing_.farthest * where.footprint;
+  record.reach = std::clamp(spacing_.error * distance, low, high);
+  record.sample.distance = record.reach / spacing_.error;
+  limit_gradients(record.sample);
+
+  const auto index = static_cast<std::uint32_t>(records_.size());
+  for_near(record.p, [&](const IrradianceRecord& near) {
+    if (glm::dot(near.n, record.n) <= 0.5f) return false;
+    IrradianceRecord& other = records_[static_cast<std::size_t>(&near - records_.data())];
+    const float limit = record.sample.distance + glm::distance(near.p, record.p);
+    if (other.sample.distance > limit) {
+      other.sample.distance = limit;
+      other.reach = std::max(spacing_.error * limit, low);
+      limit_gradients(other.sample);
+    }
+    return false;
+  });
+  records_.push_back(record);
+  insert(index, 0, Vec3(0), 1);
+}
+
+void IrradianceRecords::set_value(std::size_t index, const IrradianceSample& sample) {
+  IrradianceRecord& record = records_[index];
+  const float distance = record.sample.distance;
+  record.sample = sample;
+  record.sample.distance = distance;
+  limit_gradients(record.sample);
+}
+
+Color IrradianceRecords::mean_irradiance() const {
+  DVec3 sum(0);
+  for (const IrradianceRecord& record : records_) sum += DVec3(record.sample.irradiance);
+  return records_.empty() ? Color(0) : Color(sum / static_cast<double>(records_.size()));
+}
+
+bool IrradianceRecords::covers(const Vec3& p, const Vec3& n) const {
+  bool found = false;
+  for_near(p, [&](const IrradianceRecord& record) { return found = error(record, p, n) < 1; });
+  return found;
+}
+
+/// A record is in all cells that it may reach of the level whose cells are just as wide as that.
+void IrradianceRecords::insert(std::uint32_t record, std::int32_t node, const Vec3& centre, float half) {
+  constexpr float kSmallest = 0x1p-20f;
+  const float reach = kFar * records_[record].reach;
+  if (half < 2 * reach || half < kSmallest) {
+    entries_.push_back({record, nodes_[node].entry});
+    nodes_[node].entry = static_cast<std::int32_t>(entries_.size() - 1);
+    return;
+  }
+  const float quarter = 0.5f * half;
+  for (int octant = 0; octant < 8; ++octant) {
+    const Vec3 middle = centre + Vec3(octant & 1 ? quarter : -quarter, octant & 2 ? quarter : -quarter, octant & 4 ? quarter : -quarter);
+    const Vec3 off = glm::max(glm::abs(records_[record].p - middle) - quarter, Vec3(0));
+    if (glm::dot(off, off) > sqr(reach)) continue;
+    if (nodes_[node].children[octant] < 0) {
+      nodes_[node].children[octant] = static_cast<std::int32_t>(nodes_.size());
+      nodes_.emplace_back();
+    }
+    insert(record, nodes_[node].children[octant], middle, quarter);
+  }
+}
+
+std::vector<Receiver> cover(PrepareContext& context, IrradianceRecords& records, const std::vector<Receiver>& wanted, std::uint32_t key,
+                            SampleIrradiance sample) {
+  constexpr std::size_t kSmallestBatch = 64;
+
+  std::vector<Receiver> places;
+  std::vector<std::uint32_t> left(wanted.size());
+  std::iota(left.begin(), left.end(), 0u);
+  std::sort(left.begin(), left.end(), [](std::uint32_t a, std::uint32_t b) { return hash32(a) < hash32(b); });  // a bijection: no ties
+  std::vector<char> covered;
+  while (true) {
+    covered.assign(left.size(), 0);
+    context.for_chunks(left.size(), 256, [&](std::size_t begin, std::size_t end, Tracer&) {
+      for (std::size_t i = begin; i < end; ++i) covered[i] = records.covers(wanted[left[i]].p, wanted[left[i]].n);
+    });
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < left.size(); ++i)
+      if (!covered[i]) left[kept++] = left[i];
+    left.resize(kept);
+    if (left.empty()) return places;
+
+    // A batch that is small beside what there is: its own records hardly overlap.
+    const std::size_t batch = std::min(left.size(), std::max(kSmallestBatch, records.size() / 4));
+    std::vector<IrradianceSample> samples(batch);
+    const std::size_t first = records.size();
+    context.parallel_for(batch, [&](Tracer& tracer, std::size_t i) {
+      samples[i] = sample(tracer, wanted[left[i]], record_key(key, first + i));
+    });
+    for (std::size_t i = 0; i < batch; ++i) {
+      records.add(wanted[left[i]], samples[i]);
+      places.push_back(wanted[left[i]]);
+    }
+    left.erase(left.begin(), left.begin() + static_cast<std::ptrdiff_t>(batch));
+  }
+}
+
+BounceSeries::BounceSeries(IrradianceRecords& records) : records_(records) {
+  for (const IrradianceRecord& record : records.records()) {
+    last_.push_back(record.sample);
+    last_sum_ += DVec3(record.sample.irradiance);
+  }
+}
+
+void BounceSeries::add(PrepareContext& context, const std::vector<Receiver>& places, std::uint32_t key, SampleIrradiance sample) {
+  std::vector<IrradianceSample> samples(records_.size());
+  context.parallel_for(samples.size(), [&](Tracer& tracer, std::size_t i) { samples[i] = sample(tracer, places[i], record_key(key, i)); });
+  const DVec3 before = last_sum_;
+  last_sum_ = DVec3(0);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    last_[i] = combined(samples[i], Color(-1), records_.records()[i].sample);
+    last_sum_ += DVec3(last_[i].irradiance);
+    records_.set_value(i, samples[i]);
+  }
+  constexpr double kLargest = 0.95;  // a mean albedo that is not exceeded
+  for (int c = 0; c < 3; ++c) ratio_[c] = before[c] > 0 ? std::clamp(last_sum_[c] / before[c], 0.0, kLargest) : 0;
+}
+
+bool BounceSeries::converged() const {
+  constexpr double kNegligible = 2e-3;
+  DVec3 sum(0);
+  for (const IrradianceRecord& record : records_.records()) sum += DVec3(record.sample.irradiance);
+  return last_sum_.x + last_sum_.y + last_sum_.z <= kNegligible * (sum.x + sum.y + sum.z);
+}
+
+void BounceSeries::add_remaining() {
+  const Color factor(ratio_ / (1.0 - ratio_));
+  for (std::size_t i = 0; i < last_.size(); ++i) records_.set_value(i, combined(records_.records()[i].sample, factor, last_[i]));
+}
+
+std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, FunctionRef<bool(int x, int y)> choose,
+                                     FunctionRef<bool(const Receiver&)> keep) {
+  constexpr std::uint32_t kMostSpecular = 16;
+  const View& view = context.view();
+  const auto follow = [&](Tracer& tracer, int x, int y, std::vector<Receiver>& found) {
+    Ray ray = view.rays.ray(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
+    const SampleStream random(hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)),
+                                     static_cast<std::uint32_t>(context.seed())), 0);
+    float distance = 0;
+    for (std::uint32_t depth = 0; depth < kMostSpecular; ++depth) {
+      const Hit hit = tracer.intersect(ray, random.bits(depth, kCoverage + 1), node, RayKind::camera);
+      if (!hit.found()) return;
+      const Interaction at(context.scene(), ray, hit);
+      distance += hit.t;
+      if (any(at.bsdf().events() & Events::D)) {
+        const Receiver receiver{hit, at.front, at.at.p, at.frame.n, view.rays.height_at(distance)};
+        if (keep(receiver)) found.push_back(receiver);
+      }
+      Request<Events::S> request(tracer, random, at, Color(1), depth + 1, RayKind::camera);
+      const BsdfRay* sample = request.sample();
+      if (!sample) return;
+      ray = sample->ray;
+    }
+  };
+  std::vector<std::vector<Receiver>> rows(static_cast<std::size_t>(view.height));
+  context.parallel_for(rows.size(), [&](Tracer& tracer, std::size_t y) {
+    for (int x = 0; x < view.width; ++x)
+      if (choose(x, static_cast<int>(y))) follow(tracer, x, static_cast<int>(y), rows[y]);
+  });
+  std::vector<Receiver> all;
+  for (const auto& row : rows) all.insert(all.end(), row.begin(), row.end());
+  return all;
+}
+
+}  // namespace ln

@@ -1,0 +1,123 @@
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include "ln/hemisphere.hpp"
+
+#include <doctest/doctest.h>
+
+#include <functional>
+#include <vector>
+
+using namespace ln;
+
+namespace {
+
+/// What is seen from `p` in direction `w`.
+using Room = std::function<HemisphereCell(const Vec3& p, const Vec3& w)>;
+
+std::vector<HemisphereCell> look(const Room& room, const HemisphereGrid& grid, const Vec3& p, const Frame& frame) {
+  std::vector<HemisphereCell> cells;
+  for (int ring = 0; ring < grid.polar; ++ring)
+    for (int sector = 0; sector < grid.azimuth; ++sector)
+      cells.push_back(room(p, frame.to_world(grid.direction(ring, sector, Vec2(0.5f)))));
+  return cells;
+}
+
+/// Irradiance by a fine quadrature that shares nothing with `integrate` but the room.
+double irradiance(const Room& room, const Vec3& p, const Vec3& n) {
+  constexpr int kPolar = 500, kAzimuth = 1500;
+  const Frame frame = make_frame(n);
+  double sum = 0;
+  for (int i = 0; i < kPolar; ++i) {
+    const double theta = 0.5 * static_cast<double>(kPi) * (i + 0.5) / kPolar;
+    const double weight = std::sin(theta) * std::cos(theta);
+    for (int j = 0; j < kAzimuth; ++j) {
+      const double phi = 2 * static_cast<double>(kPi) * (j + 0.5) / kAzimuth;
+      const Vec3 local(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
+      sum += weight * static_cast<double>(room(p, frame.to_world(local)).radiance.x);
+    }
+  }
+  return sum * static_cast<double>(kPi * kPi) / (kPolar * kAzimuth);
+}
+
+/// A cube of half width 1 whose walls shine by a smooth function of the place.
+HemisphereCell bright_cube(const Vec3& p, const Vec3& w) {
+  float distance = kInfinity;
+  for (int i = 0; i < 3; ++i)
+    if (w[i] != 0) distance = std::min(distance, (std::copysign(1.0f, w[i]) - p[i]) / w[i]);
+  const Vec3 at = p + distance * w;
+  const float L = 2 + std::sin(1.5f * at.x) + 0.5f * std::cos(2 * at.y + at.z);
+  return {Color(L, 0.5f * L, 0), distance};
+}
+
+/// The same with a black plate above the floor, which hides a part of it.
+HemisphereCell cube_with_plate(const Vec3& p, const Vec3& w) {
+  constexpr float kHeight = 0.1f;
+  if (const float t = (kHeight - p.z) / w.z; t > 0) {
+    const Vec3 at = p + t * w;
+    if (at.x > -0.4f && at.x < 0.9f && std::abs(at.y) < 0.5f) return {Color(0), t};
+  }
+  return bright_cube(p, w);
+}
+
+/// Gradients of the first channel by finite differences, along the axes of the frame.
+void check_gradients(const Room& room, const Vec3& p, const Vec3& n, double tolerance) {
+  const Frame frame = make_frame(n);
+  const HemisphereGrid grid = HemisphereGrid::of(60'000);
+  const IrradianceSample sample = integrate(grid, look(room, grid, p, frame), frame);
+  const double E = irradiance(room, p, n);
+  CHECK(static_cast<double>(sample.irradiance.x) == doctest::Approx(E).epsilon(1e-3));
+
+  constexpr float kStep = 0.03f;
+  for (const Vec3& axis : {frame.s, frame.t}) {
+    const double moved = (irradiance(room, p + kStep * axis, n) - irradiance(room, p - kStep * axis, n)) / (2 * static_cast<double>(kStep));
+    CHECK(static_cast<double>((axis * sample.translation).x) == doctest::Approx(moved).epsilon(tolerance).scale(E));
+    const auto tilted = [&](float angle) { return irradiance(room, p, glm::normalize(n * std::cos(angle) + axis * std::sin(angle))); };
+    const double turned = (tilted(kStep) - tilted(-kStep)) / (2 * static_cast<double>(kStep));
+    CHECK(static_cast<double>((glm::cross(n, axis) * sample.rotation).x) == doctest::Approx(turned).epsilon(tolerance).scale(E));
+  }
+}
+
+}  // namespace
+
+TEST_CASE("directions fill their cells evenly: the mean cosine to the normal is 2/3, to the sides 0") {
+  const HemisphereGrid grid = HemisphereGrid::of(300);
+  CHECK(grid.cells() == doctest::Approx(300).epsilon(0.03));
+  DVec3 sum(0);
+  for (int ring = 0; ring < grid.polar; ++ring)
+    for (int sector = 0; sector < grid.azimuth; ++sector) sum += DVec3(grid.direction(ring, sector, Vec2(0.5f)));
+  sum /= grid.cells();
+  CHECK(sum.z == doctest::Approx(2.0 / 3).epsilon(4e-3));
+  CHECK(std::abs(sum.x) + std::abs(sum.y) < 1e-5);
+}
+
+TEST_CASE("gradients are those of finite differences where the walls shine unevenly") {
+  check_gradients(bright_cube, Vec3(0.2f, -0.3f, 0.1f), Vec3(0, 0, 1), 0.01);
+  check_gradients(bright_cube, Vec3(-0.5f, 0.6f, -0.2f), glm::normalize(Vec3(1, 2, -1)), 0.01);
+}
+
+TEST_CASE("gradients know what hides and uncovers as the point moves") {
+  check_gradients(cube_with_plate, Vec3(-0.3f, 0.2f, -0.6f), Vec3(0, 0, 1), 0.02);
+  check_gradients(cube_with_plate, Vec3(0.7f, -0.4f, -0.5f), glm::normalize(Vec3(-0.3f, 0.2f, 1)), 0.02);
+}
+
+TEST_CASE("a shining ceiling at height h: irradiance pi L, no gradient, harmonic mean distance 3/2 h") {
+  const HemisphereGrid grid = HemisphereGrid::of(2000);
+  const Frame frame = make_frame(Vec3(0, 1, 0));
+  const Room ceiling = [](const Vec3&, const Vec3& w) { return HemisphereCell{Color(2), 0.5f / w.y}; };
+  const IrradianceSample sample = integrate(grid, look(ceiling, grid, Vec3(0), frame), frame);
+  CHECK(sample.irradiance.x == doctest::Approx(2 * kPi));
+  CHECK(sample.distance == doctest::Approx(0.75).epsilon(1e-3));
+  for (int c = 0; c < 3; ++c) {
+    CHECK(glm::length(sample.translation[c]) < 1e-4f);
+    CHECK(glm::length(sample.rotation[c]) < 1e-4f);
+  }
+}
+
+TEST_CASE("nothing but sky: infinitely far, and the same wherever one goes") {
+  const HemisphereGrid grid = HemisphereGrid::of(500);
+  const Frame frame = make_frame(Vec3(0, 0, 1));
+  const Room sky = [](const Vec3&, const Vec3& w) { return HemisphereCell{Color(1 + w.x), kInfinity}; };
+  const IrradianceSample sample = integrate(grid, look(sky, grid, Vec3(0), frame), frame);
+  CHECK(sample.distance == kInfinity);
+  CHECK(glm::length(sample.translation[0]) == 0);
+  CHECK(glm::length(sample.rotation[0]) > 0.1f);
+}

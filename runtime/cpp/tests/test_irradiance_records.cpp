@@ -1,0 +1,133 @@
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include "ln/irradiance_records.hpp"
+
+#include <doctest/doctest.h>
+
+#include "photon_scenes.hpp"
+
+using namespace ln;
+using namespace ln::test;
+
+namespace {
+
+Receiver receiver(const Vec3& p, const Vec3& n = Vec3(0, 1, 0)) {
+  Receiver where;
+  where.p = p;
+  where.n = n;
+  where.footprint = 1;
+  return where;
+}
+
+IrradianceSample seen(float distance, float E = 1) {
+  IrradianceSample sample;
+  sample.irradiance = Color(E);
+  sample.distance = distance;
+  return sample;
+}
+
+Vec3 somewhere(std::uint32_t i) {
+  const SampleStream random(3, i);
+  const Vec2 u = random.get2(0, 0);
+  return Vec3(1.8f * u.x - 0.9f, 0.02f * random.get1(0, 1), 1.8f * u.y - 0.9f);
+}
+
+std::vector<Receiver> many(std::uint32_t n) {
+  std::vector<Receiver> places;
+  for (std::uint32_t i = 0; i < n; ++i) places.push_back(receiver(somewhere(i)));
+  return places;
+}
+
+SceneData any_scene() {
+  SceneBuilder b;
+  b.box(Vec3(-1), Vec3(1), b.material(Color(0.5f), Color(1)), true, 1);
+  return b.data;
+}
+
+}  // namespace
+
+TEST_CASE("the octree finds the records that a search of all finds") {
+  const RecordSpacing spacing{0.2f, 0.01f, 0.2f};
+  IrradianceRecords records(spacing);
+  for (std::uint32_t i = 0; i < 300; ++i) records.add(receiver(somewhere(i)), seen(0.05f + 0.01f * static_cast<float>(i % 40)));
+  int found_some = 0;
+  for (std::uint32_t i = 0; i < 500; ++i) {
+    const Vec3 p = somewhere(1000 + i), n(0, 1, 0);
+    float expected = 0, found = 0;
+    for (const IrradianceRecord& record : records.records()) {
+      const Vec3 d = p - record.p;
+      const float e = std::sqrt(glm::dot(d, d) + sqr(4 * d.y)) / record.reach;
+      if (e < 1.4f) expected += 1 - e / 1.4f;
+    }
+    records.visit(p, n, 1.4f, [&](const IrradianceRecord&, float w) { found += w; });
+    CHECK(found == doctest::Approx(expected).epsilon(1e-4));
+    found_some += found > 0;
+  }
+  CHECK(found_some > 100);
+}
+
+TEST_CASE("reach: the allowed error times the distance, within bounds; less where irradiance changes fast or a neighbour is near a wall") {
+  const RecordSpacing spacing{0.2f, 0.02f, 0.3f};
+  const auto reach = [&](const IrradianceSample& sample) {
+    IrradianceRecords records(spacing);
+    records.add(receiver(Vec3(0)), sample);
+    return records.records()[0].reach;
+  };
+  CHECK(reach(seen(1)) == doctest::Approx(0.2));
+  CHECK(reach(seen(1e-3f)) == doctest::Approx(0.02));
+  CHECK(reach(seen(kInfinity)) == doctest::Approx(0.3));
+  IrradianceSample steep = seen(1);
+  for (int c = 0; c < 3; ++c) steep.translation[c] = Vec3(2, 0, 0);
+  CHECK(reach(steep) == doctest::Approx(0.1));
+
+  IrradianceRecords records(spacing);
+  records.add(receiver(Vec3(0)), seen(1));
+  records.add(receiver(Vec3(0.1f, 0, 0)), seen(0.2f));
+  CHECK(records.records()[0].reach == doctest::Approx(0.2f * 0.3f));
+  records.add(receiver(Vec3(0.05f, 0, 0)), seen(1));
+  CHECK(records.records()[2].reach == doctest::Approx(0.2f * 0.25f));
+}
+
+TEST_CASE("records of another side or another level are not used") {
+  IrradianceRecords records(RecordSpacing{0.2f, 0.02f, 0.3f});
+  records.add(receiver(Vec3(0)), seen(1));
+  CHECK(records.covers(Vec3(0.15f, 0, 0), Vec3(0, 1, 0)));
+  CHECK_FALSE(records.covers(Vec3(0), Vec3(0, -1, 0)));
+  CHECK_FALSE(records.covers(Vec3(0, 0.1f, 0), Vec3(0, 1, 0)));
+}
+
+TEST_CASE("covering: all places are covered, sparsely, the same for any number of threads") {
+  const std::vector<Receiver> wanted = many(3000);
+  std::vector<float> first;
+  for (const int threads : {1, 2, 5}) {
+    Stage stage(any_scene(), threads);
+    IrradianceRecords records(RecordSpacing{});
+    const std::vector<Receiver> places = cover(stage.context, records, wanted, 7, [&](Tracer&, const Receiver& where, std::uint32_t key) {
+      return seen(0.3f + 0.2f * where.p.x, 1 + 0.1f * to_unit_float(key));
+    });
+    REQUIRE(places.size() == records.size());
+    CHECK(records.size() < wanted.size() / 2);
+    for (const Receiver& where : wanted) CHECK(records.covers(where.p, where.n));
+    std::vector<float> values;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      CHECK(records.records()[i].p == places[i].p);
+      values.push_back(records.records()[i].sample.irradiance.x);
+      values.push_back(records.records()[i].reach);
+    }
+    if (first.empty()) first = values;
+    CHECK(values == first);
+  }
+}
+
+TEST_CASE("bounces: E = 1 + E / 2 from a few rounds and the rest of the series") {
+  Stage stage(any_scene());
+  IrradianceRecords records(RecordSpacing{});
+  const auto bounce = [&](Tracer&, const Receiver&, std::uint32_t) { return seen(1, 1 + 0.5f * records.mean_irradiance().x); };
+  const std::vector<Receiver> places =
+      cover(stage.context, records, many(50), 7, [&](Tracer&, const Receiver&, std::uint32_t) { return seen(1, 1); });
+  BounceSeries series(records);
+  for (int round = 0; round < 2; ++round) series.add(stage.context, places, 7, bounce);
+  CHECK(records.mean_irradiance().x == doctest::Approx(1.75));
+  CHECK_FALSE(series.converged());
+  series.add_remaining();
+  CHECK(records.mean_irradiance().x == doctest::Approx(2));
+}

@@ -135,7 +135,7 @@ def describe_operator(op: Operator) -> str:
             + (f"; {op.converter.loss}" if op.converter.loss else "")
         )
     for port in op.ports:
-        complete = ", complete before it is read" if port.complete else ""
+        complete = ", complete before it is read" if port.complete else ", subtracted" if port.subtracted else ""
         lines += ["", f"  {port.name}: {port.representation}{'...' if port.variadic else ''} (input{complete})"]
         lines.append(textwrap.indent(port.doc, "      "))
     for parameter in op.parameters:

@@ -34,12 +34,16 @@ class Representation:
 
 @dataclass(frozen=True)
 class Port:
-    """An input. `complete`: must be whole before it is read (pushed). `pulled`: answers requests."""
+    """An input. `complete`: must be whole before it is read (pushed). `pulled`: answers requests.
+
+    `subtracted`: what is given counts with the opposite sign.
+    """
 
     name: str
     representation: str
     pulled: bool
     complete: bool
+    subtracted: bool
     variadic: bool
     doc: str
     span: Span = field(compare=False, repr=False)

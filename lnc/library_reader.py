@@ -112,7 +112,16 @@ class _OperatorReader:
                 self._error(declaration.name_span, f"'{declaration.name}' uses '{name}', which no file declares")
         pulled = {name for name, representation in self.representations.items() if representation.pulled}
         ports = tuple(
-            Port(p.name, p.representation, p.representation in pulled, p.complete, p.variadic, p.doc, p.span)
+            Port(
+                p.name,
+                p.representation,
+                p.representation in pulled,
+                p.mode == "complete",
+                p.mode == "minus",
+                p.variadic,
+                p.doc,
+                p.span,
+            )
             for p in declaration.ports
         )
         body = declaration.body

@@ -119,6 +119,15 @@ class Probe:
 
 
 @dataclass(frozen=True)
+class Lightmap:
+    """The irradiance of a wire, baked onto the surfaces."""
+
+    terms: tuple[Term, ...]
+    file: str
+    span: Span = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True)
 class Expectation:
     """`expect PATH`: the light paths that the picture, or a wire, is to contain, each once."""
 
@@ -139,13 +148,15 @@ class Network:
     image: Image | None
     taps: tuple[Tap, ...]
     probes: tuple[Probe, ...]
+    lightmaps: tuple[Lightmap, ...]
     expectations: tuple[Expectation, ...]
 
     def results(self) -> list[tuple[str, tuple[Term, ...]]]:
         """What is asked for: what to call it, and the wires that it adds up."""
         found = [("image", self.image.terms)] if self.image else []
         found += [(f"tap {tap.file}", tap.terms) for tap in self.taps]
-        return found + [(f"probe {probe.file}", probe.terms) for probe in self.probes]
+        found += [(f"probe {probe.file}", probe.terms) for probe in self.probes]
+        return found + [(f"lightmap {lightmap.file}", lightmap.terms) for lightmap in self.lightmaps]
 
     def by_name(self) -> dict[str, Node]:
         return {node.name: node for node in self.nodes}
@@ -232,6 +243,7 @@ class Schedule:
     taps: tuple[Tap, ...]
     stored_taps: tuple[Tap, ...]
     probes: tuple[Probe, ...]
+    lightmaps: tuple[Lightmap, ...]
     tags: tuple[Tag, ...]
 
     def node(self, name: str) -> ScheduledNode:

@@ -11,7 +11,7 @@ RESERVED = frozenset(
         "Network",
         "image",
         "prepare",
-        "probes",
+        "measured",
         "request",
         "write",
         "write_taps",

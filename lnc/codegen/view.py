@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 
 from lnc.codegen.languages import TagRuleView, tag_rules
 from lnc.codegen.names import cpp_string, float_literal, unique_names
 from lnc.diagnostics import InternalError
 from lnc.library import POINTS, snake_case
-from lnc.network import ParameterValue, PathValue, Probe, Schedule, ScheduledInput, ScheduledNode, Tap, Term
+from lnc.network import Lightmap, ParameterValue, PathValue, Probe, Schedule, ScheduledInput, ScheduledNode, Tap, Term
 from lnc.passes.conditions import Formula
 from lnc.paths.language import EMITTERS, EVENTS, Alphabet
 from lnc.paths.regex import Renderer
@@ -116,6 +116,16 @@ class LayerView:
     light_paths: str
     terms: tuple[TermView, ...] = ()
     file: str = ""
+    is_signed: bool = False  # shows negative values, too
+
+
+@dataclass(frozen=True)
+class DifferenceView:
+    """Two wires that are compared: the layers that show them."""
+
+    name: str
+    a: int
+    b: int
 
 
 @dataclass(frozen=True)
@@ -128,6 +138,17 @@ class ProbeView:
     sensors: str
     file: str
     on_surfaces: bool  # the wire is known on surfaces only
+
+
+@dataclass(frozen=True)
+class LightmapView:
+    """A wire that is baked onto the surfaces."""
+
+    functor: str  # name of the type that evaluates the terms
+    terms: tuple[TermView, ...]
+    wire: str
+    light_paths: str
+    file: str
 
 
 @dataclass(frozen=True)
@@ -153,8 +174,11 @@ class ProgramView:
     layers: tuple[LayerView, ...]
     emitters_layer: int  # the layer of the emitters that are seen; -1: there is none
     subtracts: bool
+    differences: tuple[DifferenceView, ...]
+    shows_difference: bool  # the picture is that of a Difference
     stored_taps: tuple[StoredTapView, ...]
     probes: tuple[ProbeView, ...]
+    lightmaps: tuple[LightmapView, ...]
     has_image: bool
     slots: tuple[SlotView, ...]
     tags: tuple[TagRuleView, ...]
@@ -193,12 +217,15 @@ class _Builder:
         self.variables = unique_names(wires, "seen_", [*self.members.values(), *self.pulls.values()])
         numbers = [str(i + 1) for i in range(len(schedule.probes))]
         self.probes = list(unique_names(numbers, "probe_", [*self.members.values()]).values())
+        numbers = [str(i + 1) for i in range(len(schedule.lightmaps))]
+        self.lightmaps = list(unique_names(numbers, "lightmap_", [*self.members.values()]).values())
         self.flags = unique_names(
             [n.identifier for n in schedule.nodes if n.name in light.conditions], "skip_", self.members.values()
         )
         self.by_name = {n.name: n for n in schedule.nodes}
         self.tag_bits = {tag.name: i for i, tag in enumerate(schedule.tags)}
         self.layers: list[LayerView] = []
+        self.differences: list[DifferenceView] = []
 
     def build(self, source: str) -> ProgramView:
         nodes = {n.name: self.node(n) for n in self.schedule.nodes}
@@ -216,9 +243,12 @@ class _Builder:
             picture=self.seen_terms(image.terms) if image else (),
             layers=tuple(self.layers),
             emitters_layer=emitters_layer,
+            differences=tuple(self.differences),
+            shows_difference=image is not None and self.difference(image.terms) is not None,
             subtracts=any(t.weight < 0 for terms in self.all_terms() for t in terms),
             stored_taps=tuple(self.stored_tap(tap) for tap in self.schedule.stored_taps),
             probes=tuple(self.probe(i, probe) for i, probe in enumerate(self.schedule.probes)),
+            lightmaps=tuple(self.lightmap(i, each) for i, each in enumerate(self.schedule.lightmaps)),
             has_image=self.schedule.image is not None,
             slots=tuple(slot for n in self.schedule.nodes for slot in self.slots(n)),
             tags=tag_rules(self.schedule.tags),
@@ -348,29 +378,58 @@ class _Builder:
                 name += "_"
             emitters = self.layer(name, "L S* E")
         for tap in self.schedule.taps:
-            paths = " + ".join(_weighted(w, self.light.seen_paths[wire]) for wire, w in _merged(tap.terms).items())
-            paths = paths.replace("+ -", "- ")
-            self.layers.append(LayerView(Path(tap.file).stem, paths, self.seen_terms(tap.terms), tap.file))
+            paths = self.paths_text(tap.terms)
+            is_signed = self.difference(tap.terms) is not None or any(w < 0 for w in _merged(tap.terms).values())
+            self.layers.append(LayerView(Path(tap.file).stem, paths, self.seen_terms(tap.terms), tap.file, is_signed))
+        results = ([image.terms] if image else []) + [tap.terms for tap in self.schedule.taps]
+        for n in dict.fromkeys(self.difference(terms) for terms in results):
+            if n is not None:
+                a, b = (self.compared(n, i) for i in n.inputs)
+                self.differences.append(DifferenceView(n.name, a, b))
         return emitters
+
+    def difference(self, terms: tuple[Term, ...]) -> ScheduledNode | None:
+        """The Difference that a result is made of, if it is one alone."""
+        wires = _merged(terms)
+        n = self.by_name[next(iter(wires))] if list(wires.values()) == [1] else None
+        return n if n is not None and n.op.name == "Difference" else None
+
+    def compared(self, n: ScheduledNode, given: ScheduledInput) -> int:
+        """The layer of one side of a Difference, called as its wire."""
+        sign = -1 if given.port.subtracted else 1
+        terms = tuple(replace(t, weight=sign * t.weight) for t in given.terms)
+        name = terms[0].node if len(terms) == 1 else f"{n.name}_{given.port.name}"
+        while any(name == layer.name for layer in self.layers if not layer.file):
+            name += "_"
+        return self.layer(name, self.paths_text(terms), self.seen_terms(terms))
+
+    def paths_text(self, terms: tuple[Term, ...]) -> str:
+        """What the eye sees of a sum."""
+        paths = (_weighted(weight, self.light.seen_paths[wire]) for wire, weight in _merged(terms).items())
+        return " + ".join(paths).replace("+ -", "- ")
 
     def seen(self) -> tuple[SeenView, ...]:
         """The wires that results are made of, each once. A sum is made of its terms, which results may show, too."""
         results = [self.schedule.image.terms] if self.schedule.image else []
         results += [tap.terms for tap in self.schedule.taps]
+        shown = dict.fromkeys(self.difference(terms) for terms in results)
+        results += [i.terms for n in shown if n is not None for i in n.inputs]
         found: dict[str, SeenView] = {}
         stack = [wire for terms in reversed(results) for wire in reversed(_merged(terms))]
         while stack:
             n = self.by_name[stack[-1]]
-            terms = _merged(n.inputs[0].terms) if n.op.name == "Sum" and n.receivers is None else {}
+            # What `to` restricts is pulled as a whole.
+            sides = [i.terms for i in n.inputs] if n.op.name in ("Sum", "Difference") and n.receivers is None else []
+            summed = tuple(term for terms in sides for term in terms)
+            terms = _merged(summed)
             missing = [wire for wire in terms if wire not in found]
             if missing and n.name not in found:
                 stack += reversed(missing)
                 continue
             stack.pop()
             if n.name not in found:
-                summed = self.seen_terms(n.inputs[0].terms) if terms else ()
                 pull = "" if terms else self.pulls[n.identifier]
-                found[n.name] = SeenView(self.variables[n.identifier], pull, summed)
+                found[n.name] = SeenView(self.variables[n.identifier], pull, self.seen_terms(summed))
         return tuple(found.values())
 
     def seen_terms(self, terms: tuple[Term, ...]) -> tuple[TermView, ...]:
@@ -384,6 +443,7 @@ class _Builder:
         """Every sum of the network."""
         sums = [i.terms for n in self.schedule.nodes for i in n.inputs] + [tap.terms for tap in self.schedule.taps]
         sums += [probe.terms for probe in self.schedule.probes]
+        sums += [lightmap.terms for lightmap in self.schedule.lightmaps]
         return sums + ([self.schedule.image.terms] if self.schedule.image else [])
 
     def stored_tap(self, tap: Tap) -> StoredTapView:
@@ -398,6 +458,15 @@ class _Builder:
             sensors=probe.sensors,
             file=probe.file,
             on_surfaces=any(self.on_surfaces(term.node, set()) for term in probe.terms),
+        )
+
+    def lightmap(self, number: int, lightmap: Lightmap) -> LightmapView:
+        return LightmapView(
+            functor=self.lightmaps[number],
+            terms=self.terms(lightmap.terms),
+            wire=_sum_text(lightmap.terms),
+            light_paths=self.paths_text(lightmap.terms),
+            file=lightmap.file,
         )
 
     def on_surfaces(self, name: str, seen: set[str]) -> bool:

@@ -105,14 +105,15 @@ twice. Parameters are always given by name.""",
     Page(
         "LN0109",
         "no result",
-        """The network has no `image`, `tap` or `probe`, so there is nothing to compute.""",
+        """The network has no `image`, `tap`, `probe` or `lightmap`, so there is nothing to compute.""",
         "light = Lights()\n",
     ),
     Page(
         "LN0110",
         "not supported",
-        """The statement is part of the language, but this version cannot compile it, or not in this place.""",
-        'light = Lights()\nlightmap Direct(light) -> "walls.gltf"\n',
+        """Declarations of operators and representations belong into a folder of an operator library, which
+--ops names, not into a network.""",
+        "representation Mine\n",
     ),
     Page(
         "LN0111",

@@ -53,7 +53,8 @@ class _Inserter:
             image = replace(image, terms=self._result(image.terms, "image", image.span))
         taps = tuple(self._tap(tap) for tap in network.taps)
         probes = tuple(replace(probe, terms=self._result(probe.terms, "probe", probe.span)) for probe in network.probes)
-        network = replace(network, nodes=tuple(self.nodes), image=image, taps=taps, probes=probes)
+        lightmaps = tuple(replace(m, terms=self._result(m.terms, "lightmap", m.span)) for m in network.lightmaps)
+        network = replace(network, nodes=tuple(self.nodes), image=image, taps=taps, probes=probes, lightmaps=lightmaps)
         return replace(self.typed, network=network, representations=self.representations)
 
     def _tap(self, tap: Tap) -> Tap:

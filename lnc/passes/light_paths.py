@@ -42,13 +42,16 @@ def light_paths(network: Network, alphabet: Alphabet) -> PathReport:
 
 
 def seen_paths(network: Network, alphabet: Alphabet) -> dict[str, str]:
-    """What the eye sees of each wire that has a picture of its own (a term of `image ... layers` or of a `tap`, or a
-    `WireTap`): its paths, closed as the picture closes them, without the emitters that are seen."""
+    """What the eye sees of each wire that has a picture of its own (a term of `image ... layers`, of a `tap`, a
+    `lightmap` or a `Difference`, or a `WireTap`): its paths, closed as the picture closes them, without the emitters
+    that are seen."""
     automaton = PathAutomaton(network, alphabet)
     renderer = Renderer(alphabet)
     terms = [t for tap in network.taps for t in tap.terms]
+    terms += [t for lightmap in network.lightmaps for t in lightmap.terms]
     if network.image is not None and network.image.layers:
         terms += network.image.terms
+    terms += [t for n in network.nodes if n.op.name == "Difference" for i in n.inputs for t in i.terms]
     shown = {t.node for t in terms} | {n.name for n in network.nodes if n.op.name == "WireTap"}
     return {
         name: _text(automaton, automaton.seen([Term(name, 1, network.by_name()[name].span)]), renderer)

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lnc.conversions import cheapest_chains
 from lnc.diagnostics import Related, Reporter, did_you_mean, quote
 from lnc.library import Library, Operator, Parameter, Port
 from lnc.naming import Names
-from lnc.network import Expectation, Image, Input, Network, Node, ParameterValue, Probe, Tag, Tap, Term
+from lnc.network import Expectation, Image, Input, Lightmap, Network, Node, ParameterValue, Probe, Tag, Tap, Term
 from lnc.passes.parameters import parameter_value, report_unknown_tags
 from lnc.source import Span
 from lnc.syntax import ast
@@ -88,6 +88,7 @@ class _Resolver:
         image: Image | None = None
         taps: list[Tap] = []
         probes: list[Probe] = []
+        lightmaps: list[Lightmap] = []
         expectations: list[Expectation] = []
         for statement in self.file.statements:
             match statement:
@@ -110,13 +111,16 @@ class _Resolver:
                         message = f"the probe would overwrite its sensors {quote(path)}"
                         self.reporter.error("LN0104", statement.span, message, help="give its results another name")
                     probes.append(Probe(terms or (), sensors, path, statement.span))
-                case ast.LightmapStatement():
-                    self.reporter.error("LN0110", statement.span, "'lightmap' is not supported yet")
+                case ast.LightmapStatement(wire, path):
+                    terms = self._wire(wire, _Home("lightmap", statement.span))
+                    self._check_file("a lightmap is a glTF file (.glb)", ".glb", path, statement.span)
+                    lightmaps.append(Lightmap(terms or (), path, statement.span))
                 case ast.OperatorDeclaration() | ast.RepresentationDeclaration():
                     message = "declarations belong into a folder of an operator library"
                     self.reporter.error("LN0110", statement.span, message, help="give its folder by --ops")
-        self._check_distinct([(tap.file, tap.span) for tap in taps] + [(probe.file, probe.span) for probe in probes])
-        if image is None and not taps and not probes and not self.reporter.failed:
+        written: list[Tap | Probe | Lightmap] = [*taps, *probes, *lightmaps]
+        self._check_distinct([(result.file, result.span) for result in written])
+        if image is None and not written and not self.reporter.failed:
             start = self.file.statements[0].span if self.file.statements else self.file.span
             self.reporter.error("LN0109", start, "the network has no result", help="add: image WIRE")
         self._check_layers(image)
@@ -129,6 +133,7 @@ class _Resolver:
             image=image,
             taps=tuple(taps),
             probes=tuple(probes),
+            lightmaps=tuple(lightmaps),
             expectations=tuple(expectations),
         )
 
@@ -342,7 +347,7 @@ class _Resolver:
             self.reporter.error("LN0105", call.span, message, related=[_declared_here(op, missing[0].span)])
         if missing or wrong:
             return None
-        return tuple(given[p.name] for p in op.ports)
+        return tuple(_signed(given[p.name]) for p in op.ports)
 
     def _too_many_wires(self, op: Operator, span: Span) -> None:
         if not op.ports:
@@ -524,3 +529,10 @@ def _unknown_arguments(call: ast.Call, op: Operator) -> list[ast.Argument]:
 
 def _declared_here(op: Operator, span: Span) -> Related:
     return Related(span, f"'{op.name}' is declared here")
+
+
+def _signed(given: Input) -> Input:
+    """With the sign of its port."""
+    if not given.port.subtracted:
+        return given
+    return replace(given, terms=tuple(replace(term, weight=-term.weight) for term in given.terms))

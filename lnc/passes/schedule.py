@@ -51,6 +51,7 @@ def schedule(network: Network, contents: dict[str, tuple[str, ...]]) -> Schedule
         taps=tuple(tap for tap in network.taps if _is_picture(tap, nodes)),
         stored_taps=tuple(tap for tap in network.taps if not _is_picture(tap, nodes)),
         probes=network.probes,
+        lightmaps=network.lightmaps,
         tags=network.tags,
     )
 
@@ -142,6 +143,7 @@ def print_schedule(plan: Schedule) -> str:
     lines += [f"tap {_terms_text(tap.terms)} -> {tap.file!r}" for tap in plan.taps]
     lines += [f"tap {_terms_text(tap.terms)} -> {tap.file!r} [stored]" for tap in plan.stored_taps]
     lines += [f"probe {_terms_text(probe.terms)} at {probe.sensors!r} -> {probe.file!r}" for probe in plan.probes]
+    lines += [f"lightmap {_terms_text(each.terms)} -> {each.file!r}" for each in plan.lightmaps]
     return "\n".join(lines) + "\n"
 
 

@@ -294,7 +294,7 @@ class RepresentationDeclaration(Record):
 class PortDeclaration(Record):
     name: str
     representation: str
-    complete: bool
+    mode: str  # "complete", "minus" or nothing
     variadic: bool
     doc: str
     span: Span

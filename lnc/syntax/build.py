@@ -297,10 +297,10 @@ class Builder:
         )
 
     def port(self, span: Span, children: Children) -> ast.PortDeclaration:
-        complete = children[0].type == "COMPLETE"
+        mode = children[0].text if children[0].type in ("COMPLETE", "SUBTRACTED") else ""
         variadic = children[-1].type == "ELLIPSIS"
-        name, representation = children[complete : len(children) - variadic]
-        return ast.PortDeclaration(name.text, representation.text, complete, variadic, self._doc(span.start), span)
+        name, representation = children[bool(mode) : len(children) - variadic]
+        return ast.PortDeclaration(name.text, representation.text, mode, variadic, self._doc(span.start), span)
 
     def parameter(self, span: Span, children: Children) -> ast.ParameterDeclaration:
         name, kind, *rest = children

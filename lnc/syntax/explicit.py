@@ -6,7 +6,9 @@ caustic = NNDensity(photons)        photons_tree = KDPhotonTree(photons)
 
 from __future__ import annotations
 
-from lnc.network import Network, Node, Term
+from dataclasses import replace
+
+from lnc.network import Input, Network, Node, Term
 from lnc.source import Span
 from lnc.syntax import ast
 from lnc.syntax.printer import print_file
@@ -20,7 +22,7 @@ def explicit(file: ast.File, network: Network) -> str:
         if node.origin != "equation":
             added.setdefault(node.statement, []).append(node)
     statements: list[ast.Statement] = []
-    taps, probes = iter(network.taps), iter(network.probes)
+    taps, probes, lightmaps = iter(network.taps), iter(network.probes), iter(network.lightmaps)
     for statement in file.statements:
         statements += [_equation(node, ast.Comments()) for node in added.pop(statement.span, ())]
         match statement:
@@ -33,13 +35,15 @@ def explicit(file: ast.File, network: Network) -> str:
                 statements.append(statement.changed(wire=_wire(next(taps).terms, statement.span)))
             case ast.ProbeStatement():
                 statements.append(statement.changed(wire=_wire(next(probes).terms, statement.span)))
+            case ast.LightmapStatement():
+                statements.append(statement.changed(wire=_wire(next(lightmaps).terms, statement.span)))
             case _:
                 statements.append(statement)
     return print_file(file.changed(statements=tuple(_tidy(statements))))
 
 
 def _equation(node: Node, comments: ast.Comments) -> ast.Equation:
-    inputs = tuple(_wire(given.terms, node.span) for given in node.inputs)
+    inputs = tuple(_wire(_unsigned(given), node.span) for given in node.inputs)
     arguments = tuple(
         ast.Argument(p.name, p.given, node.span, node.span) for p in node.parameters if p.given is not None
     )
@@ -48,6 +52,12 @@ def _equation(node: Node, comments: ast.Comments) -> ast.Equation:
     if plain_sum or (node.op.name == "Sum" and any(t.weight < 0 for t in node.inputs[0].terms)):
         wire = inputs[0]
     return ast.Equation(node.name, None, wire, comments, node.span, node.span)
+
+
+def _unsigned(given: Input) -> tuple[Term, ...]:
+    """The terms as they are written at their port."""
+    sign = -1 if given.port.subtracted else 1
+    return tuple(replace(term, weight=sign * term.weight) for term in given.terms)
 
 
 def _wire(terms: tuple[Term, ...], span: Span) -> ast.WireExpression:

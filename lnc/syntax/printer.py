@@ -124,8 +124,7 @@ def _operator(operator: ast.OperatorDeclaration) -> tuple[str, str, str, tuple[s
     body = list(_block([_Line(i.comments, *_item(i)) for i in operator.body]))
     more = (*_indent([*body, *operator.end_comments]), "}")
     ports = [
-        f"{'complete ' if p.complete else ''}{p.name}: {p.representation}{'...' if p.variadic else ''}"
-        for p in operator.ports
+        f"{p.mode} {p.name}".lstrip() + f": {p.representation}{'...' if p.variadic else ''}" for p in operator.ports
     ]
     tail = f") -> {operator.output} {{"
     if not any(p.doc for p in operator.ports):

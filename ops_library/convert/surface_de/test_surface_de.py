@@ -30,7 +30,9 @@ def test_mean_agrees_with_path_tracing(compiled_network, run_program, scene):
         pictures.append(exr.read(run.picture))
     mesh, paths = pictures
     assert mesh.mean() == pytest.approx(paths.mean(), rel=0.015)
-    if scene == "closed_box.gltf":  # no shadows; only right beside the lamp the light varies faster than kernels are wide
+    if (
+        scene == "closed_box.gltf"
+    ):  # no shadows; only right beside the lamp the light varies faster than kernels are wide
         errors = abs(blocks(mesh) / blocks(paths) - 1)
         assert (errors < 0.025).mean() > 0.95
         assert errors.max() < 0.09

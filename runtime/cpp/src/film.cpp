@@ -19,10 +19,9 @@ void check_memory(int width, int height, int layer_count) {
               " free: choose a smaller --size");
 }
 
-float present(double mean) {
+float limited(double mean) {
   constexpr double kLargest = std::numeric_limits<float>::max();
-  if (!(mean > 0)) return 0;
-  return mean < kLargest ? static_cast<float>(mean) : std::numeric_limits<float>::max();
+  return static_cast<float>(std::clamp(mean, -kLargest, kLargest));
 }
 
 }  // namespace
@@ -57,15 +56,43 @@ void Film::accumulate_repaired(double (&sum)[3], const Color& c) {
 }
 
 Color Film::mean(int x, int y, int layer) const {
+  const Color value = layer == kPicture ? picture_mean(x, y) : signed_mean(x, y, layer);
+  const bool absolute = layer == kPicture && samples_ == Samples::difference;
+  return absolute ? glm::abs(value) : glm::max(value, Color(0));
+}
+
+Color Film::picture_mean(int x, int y) const {
   const Pixel& pixel = pixels_[pixel_index(x, y)];
   const double count = static_cast<double>(pixel.count[0]) + static_cast<double>(pixel.count[1]);
   if (count == 0) return Color(0);
-  if (layer == kPicture) {
-    return {present((pixel.sum[0][0] + pixel.sum[1][0]) / count), present((pixel.sum[0][1] + pixel.sum[1][1]) / count),
-            present((pixel.sum[0][2] + pixel.sum[1][2]) / count)};
-  }
+  return {limited((pixel.sum[0][0] + pixel.sum[1][0]) / count), limited((pixel.sum[0][1] + pixel.sum[1][1]) / count),
+          limited((pixel.sum[0][2] + pixel.sum[1][2]) / count)};
+}
+
+Color Film::signed_mean(int x, int y, int layer) const {
+  const std::uint32_t count = samples(x, y);
+  if (count == 0) return Color(0);
   const Sum& sum = layers_[static_cast<std::size_t>(layer) * pixels_.size() + pixel_index(x, y)];
-  return {present(sum.value[0] / count), present(sum.value[1] / count), present(sum.value[2] / count)};
+  return {limited(sum.value[0] / count), limited(sum.value[1] / count), limited(sum.value[2] / count)};
+}
+
+Comparison Film::compare(int a, int b) const {
+  Comparison found;
+  double difference = 0, sum = 0;
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      const DVec3 reference(signed_mean(x, y, b)), d = DVec3(signed_mean(x, y, a)) - reference;
+      for (std::size_t i = 0; i < 3; ++i) {
+        found.rel_mse += d[i] * d[i] / (reference[i] * reference[i] + 0.01);
+        found.largest = std::max(found.largest, std::abs(d[i]));
+        difference += d[i];
+        sum += reference[i];
+      }
+    }
+  }
+  found.rel_mse /= 3.0 * static_cast<double>(pixels_.size());
+  if (sum != 0) found.bias = difference / sum;
+  return found;
 }
 
 Film::Range Film::sample_range() const {

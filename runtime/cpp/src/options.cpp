@@ -321,7 +321,7 @@ std::string replaced(std::string text, std::string_view before, std::string_view
 
 /// The texts of all options as they were given.
 struct RawOptions {
-  std::string scene, output, size, camera, samples, time, error, seed, threads, stats, progress, preview, environment, units;
+  std::string scene, output, size, camera, samples, time, error, seed, threads, stats, progress, preview, environment, units, lightmap_size;
   std::vector<std::string> sets;
   bool version = false;
 };
@@ -348,6 +348,7 @@ void declare_options(CLI::App& app, RawOptions& raw) {
   add("--preview", raw.preview, "FILE.png", "write a tone-mapped picture every few seconds and at the end");
   add("--env", raw.environment, "FILE.hdr", "environment map that lights the scene");
   add("--units", raw.units, "UNITS", "radiometric or photometric (default: radiometric)");
+  add("--lightmap-size", raw.lightmap_size, "N", "texels along each side of a lightmap's texture (default: 512)");
   app.add_flag("--version", raw.version, "print the version and exit");
 }
 
@@ -503,6 +504,7 @@ Options parse_options(int argc, const char* const* argv, const ProgramInfo& prog
   if (!raw.units.empty()) {
     options.units = parse_choice<Units>("--units", raw.units, {{"radiometric", Units::radiometric}, {"photometric", Units::photometric}});
   }
+  if (!raw.lightmap_size.empty()) options.lightmap_side = static_cast<int>(parse_whole("--lightmap-size", raw.lightmap_size, 16, kLargestLightmap));
   const auto unused = [&](const char* name, const std::string& value, bool used) {
     if (!used && !value.empty()) options.unused.push_back(name);
   };
@@ -510,6 +512,7 @@ Options parse_options(int argc, const char* const* argv, const ProgramInfo& prog
   unused("--preview", raw.preview, program.has_image);
   unused("--size", raw.size, program.uses_camera());
   unused("--camera", raw.camera, program.uses_camera());
+  unused("--lightmap-size", raw.lightmap_size, !program.lightmaps.empty());
   options.sets = raw.sets;
   for (const std::string& text : raw.sets) apply_set(text, program);
   return options;

@@ -11,6 +11,7 @@
 #include "ln/exr_film.hpp"
 #include "ln/film.hpp"
 #include "ln/interrupt.hpp"
+#include "ln/lightmap.hpp"
 #include "ln/output_file.hpp"
 #include "ln/parallel.hpp"
 #include "ln/preview.hpp"
@@ -56,6 +57,10 @@ std::vector<NamedFile> files_of(const Options& options, const ProgramInfo& progr
     names.push_back({"the probe's sensors", probe.sensors, false});
     names.push_back({"a probe", probe.file, true});
   }
+  for (const LightmapInfo& lightmap : program.lightmaps) {
+    names.push_back({"a lightmap", lightmap.file, true});
+    names.push_back({"a lightmap's texture", atlas_file(lightmap.file), true});
+  }
   for (const TapInfo& tap : program.taps) names.push_back({"a tap", tap.file, true});
   for (const LayerInfo& layer : program.layers)
     if (layer.file) names.push_back({"a tap", layer.file, true});
@@ -81,7 +86,13 @@ RenderLimits limits_of(const Options& options, double prepare_seconds) {
   return limits;
 }
 
-ExrMetadata metadata_of(const Options& options, const RenderOutcome& outcome) {
+std::string comparison_text(const DifferenceStats& found) {
+  char text[120];
+  std::snprintf(text, sizeof text, "relMSE %.4g, bias %.3g %%, largest difference %.4g", found.rel_mse, 100 * found.bias, found.largest);
+  return text;
+}
+
+ExrMetadata metadata_of(const Options& options, const RenderOutcome& outcome, const Stats& stats) {
   ExrMetadata metadata{{"software", std::string("Lighting Networks")},
                        {"scene", base_name(options.scene)},
                        {"samples", static_cast<std::int32_t>(outcome.samples)},
@@ -93,6 +104,7 @@ ExrMetadata metadata_of(const Options& options, const RenderOutcome& outcome) {
   std::string sets;
   for (const std::string& set : options.sets) sets += (sets.empty() ? "" : " ") + set;
   if (!sets.empty()) metadata.emplace_back("parameters", sets);
+  for (const DifferenceStats& each : stats.differences) metadata.emplace_back("difference." + each.name, comparison_text(each));
   return metadata;
 }
 
@@ -135,6 +147,15 @@ void report_repairs(const Film& film) {
           " were negative; they count as black. This is a fault of an operator or of the scene's values");
 }
 
+/// Says how far the two sides of each Difference are apart.
+void compare(const Film& film, const ProgramInfo& program, Stats& stats) {
+  for (const DifferenceInfo& info : program.differences) {
+    const Comparison found = film.compare(info.a, info.b);
+    stats.differences.push_back({info.name, found.rel_mse, found.bias, found.largest});
+    note(std::string(info.name) + ": " + comparison_text(stats.differences.back()));
+  }
+}
+
 /// Renders what the camera sees into the film and writes it, if it is a picture.
 RenderOutcome render_picture(RunContext& context, RunCallbacks& callbacks, const RenderLimits& limits, Film& film) {
   const Options& options = context.options;
@@ -155,8 +176,9 @@ RenderOutcome render_picture(RunContext& context, RunCallbacks& callbacks, const
 
   context.progress.phase("write");
   report_repairs(film);
+  compare(film, context.program, context.stats);
   if (!has_image) return outcome;
-  write_exr(options.output, film, context.program, metadata_of(options, outcome), context.workers.count());
+  write_exr(options.output, film, context.program, metadata_of(options, outcome, context.stats), context.workers.count());
   context.stats.seconds.total = seconds_since_start();
   if (!options.preview_path.empty()) write_preview(options.preview_path, film);
   return outcome;
@@ -165,7 +187,7 @@ RenderOutcome render_picture(RunContext& context, RunCallbacks& callbacks, const
 int render_program(const Options& options, const ProgramInfo& program, RunCallbacks& callbacks, Progress& progress) {
   check_files(files_of(options, program));
   for (const char* option : options.unused)
-    note(std::string(option) + " is not used: the network has no " + (program.uses_camera() ? "image" : "picture, so no camera looks at the scene"));
+    note(std::string(option) + " is not used: this network has nothing for it");
 
   Workers workers(options.threads);
   Stats stats;
@@ -189,7 +211,9 @@ int render_program(const Options& options, const ProgramInfo& program, RunCallba
   std::optional<Film> film;
   if (program.uses_camera()) {
     film.emplace(size.width, size.height, static_cast<int>(program.layers.size()),
-                 program.subtracts ? Film::Samples::signed_values : Film::Samples::positive);
+                 program.shows_difference ? Film::Samples::difference
+                 : program.subtracts      ? Film::Samples::signed_values
+                                          : Film::Samples::positive);
   }
   progress.phase("prepare");
   watch = Stopwatch();
@@ -199,12 +223,12 @@ int render_program(const Options& options, const ProgramInfo& program, RunCallba
 
   RenderOutcome outcome = callbacks.measure(context, limits_of(options, stats.seconds.prepare));
   stats.seconds.render = outcome.seconds;
-  stats.seconds.total = seconds_since_start();
   if (film) {
     throw_if_interrupted();
     outcome = render_picture(context, callbacks, limits_of(options, stats.seconds.prepare + stats.seconds.render), *film);
   }
   callbacks.finish(context, film ? &*film : nullptr);
+  if (!program.has_image) stats.seconds.total = seconds_since_start();
   stats.samples = outcome.samples;
   stats.interrupted = outcome.interrupted;
   stats.peak_bytes = peak_memory_bytes();

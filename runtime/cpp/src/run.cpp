@@ -124,6 +124,7 @@ PictureSize NetworkRun::load(RunContext& context) {
     has_environment_ = true;
   }
   for (const ProbeInfo& info : program_.probes) probes_.emplace_back(info);
+  for (const LightmapInfo& info : program_.lightmaps) lightmaps_.emplace_back(info);
   if (!program_.uses_camera()) return {};
   chosen_camera_ = choose_camera(data_, options.camera);
   size_ = picture_size(options, chosen_camera_.aspect);
@@ -163,20 +164,26 @@ void NetworkRun::prepare(RunContext& context) {
 }
 
 RenderOutcome NetworkRun::measure(RunContext& context, const RenderLimits& limits) {
+  const std::size_t count = probes_.size() + lightmaps_.size();
   RenderOutcome all;
-  for (std::size_t i = 0; i < probes_.size() && !all.interrupted; ++i) {
-    context.progress.phase("render", program_.probes[i].file);
-    Probe& probe = probes_[i];
-    probe.place(tracer(0));
+  for (std::size_t i = 0; i < count && !all.interrupted; ++i) {
+    const bool is_probe = i < probes_.size();
+    const std::size_t map = i - probes_.size();
+    context.progress.phase("render", is_probe ? program_.probes[i].file : program_.lightmaps[map].file);
+    if (is_probe) probes_[i].place(tracer(0));
+    else lightmaps_[map].lay_out(scene_->data(), context.options.lightmap_side);
+
     RenderLimits own = limits;
-    if (context.options.default_samples) own.samples = kDefaultProbeSamples;
+    if (is_probe && context.options.default_samples) own.samples = kDefaultProbeSamples;
     // What follows gets its share of the time.
-    if (own.seconds) *own.seconds = (*own.seconds - all.seconds) / static_cast<double>(probes_.size() - i + (program_.uses_camera() ? 1 : 0));
-    Film film(probe.size(), 1, 0, program_.subtracts ? Film::Samples::signed_values : Film::Samples::positive);
+    if (own.seconds) *own.seconds = (*own.seconds - all.seconds) / static_cast<double>(count - i + (program_.uses_camera() ? 1 : 0));
+    Film film(is_probe ? probes_[i].size() : lightmaps_[map].side(), is_probe ? 1 : lightmaps_[map].side(), 0,
+              program_.subtracts ? Film::Samples::signed_values : Film::Samples::positive);
     const RenderOutcome outcome = render_passes(film, own, context.workers, context.progress,
                                                 [&](const Tile& tile, Film& target) { measure_tile(i, tile, target); });
     if (outcome.samples == 0) throw Interrupted{};
-    probe.write(context.options.units);
+    if (is_probe) probes_[i].write(context.options.units);
+    else lightmaps_[map].write(film, program_.network, scene_->data());
     const double seconds = all.seconds + outcome.seconds;
     all = outcome;
     all.seconds = seconds;
@@ -197,11 +204,12 @@ void NetworkRun::write_pictures(const Film& film) const {
     rgb.reserve(static_cast<std::size_t>(film.width()) * static_cast<std::size_t>(film.height()) * 3);
     for (int y = 0; y < film.height(); ++y) {
       for (int x = 0; x < film.width(); ++x) {
-        const Color c = film.mean(x, y, static_cast<int>(i));
+        const Color c = layer.is_signed ? film.signed_mean(x, y, static_cast<int>(i)) : film.mean(x, y, static_cast<int>(i));
         rgb.insert(rgb.end(), {c.x, c.y, c.z});
       }
     }
-    write_exr(layer.file, film.width(), film.height(), rgb.data(), {{"network", program_.network}, {"lightPaths", layer.light_paths}});
+    write_exr(layer.file, film.width(), film.height(), rgb.data(), {{"network", program_.network}, {"lightPaths", layer.light_paths}},
+              layer.is_signed);
   }
 }
 

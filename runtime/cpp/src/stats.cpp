@@ -108,6 +108,10 @@ std::string stats_json(const Stats& stats) {
                      {"skipped", or_null(node.skipped)}});
   }
 
+  Json differences = Json::array();
+  for (const DifferenceStats& each : stats.differences)
+    differences.push_back({{"name", each.name}, {"relMSE", each.rel_mse}, {"bias", each.bias}, {"max", each.largest}});
+
   const Json json{{"network", stats.network},
                   {"scene", scene},
                   {"seconds",
@@ -131,7 +135,8 @@ std::string stats_json(const Stats& stats) {
                   {"seed", stats.seed},
                   {"interrupted", stats.interrupted},
                   {"error_estimate", or_null(stats.error_estimate)},
-                  {"repaired_samples", stats.repaired_samples}};
+                  {"repaired_samples", stats.repaired_samples},
+                  {"differences", differences}};
   // File names need not be UTF-8.
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -30,10 +30,18 @@ struct ErrorEstimate {
   double standard_error = kInfinity;  // of that estimate, from the differences between pixels
 };
 
+/// How far two pictures are apart, over all pixels and channels.
+struct Comparison {
+  double rel_mse = 0;  // mean of (a - b)^2 / (b^2 + 0.01)
+  double bias = 0;     // mean(a - b) / mean(b); 0 if b is black
+  double largest = 0;  // largest |a - b|
+};
+
 class Film {
  public:
-  /// Values that single samples may have. `signed_values`: of differences, whose mean alone has to be positive.
-  enum class Samples : std::uint8_t { positive, signed_values };
+  /// Values that single samples may have. `signed_values`: of networks that subtract, where the mean alone has to be positive.
+  /// `difference`: the mean may be negative, too, and the picture is its absolute value.
+  enum class Samples : std::uint8_t { positive, signed_values, difference };
 
   /// Throws Error if the machine has too little memory for it.
   Film(int width, int height, int layer_count = 0, Samples samples = Samples::positive);
@@ -41,6 +49,7 @@ class Film {
   int width() const { return width_; }
   int height() const { return height_; }
   int layer_count() const { return layer_count_; }
+  bool shows_difference() const { return samples_ == Samples::difference; }
   static std::uint64_t bytes_needed(int width, int height, int layer_count);
 
   /// Adds a sample of the picture. Row 0 is the top. A value that no picture may hold is repaired (not a number, infinite: 0;
@@ -60,6 +69,11 @@ class Film {
   /// Mean of the picture, or of a layer (0 and up), as it is written: finite, not negative; black without samples.
   static constexpr int kPicture = -1;
   Color mean(int x, int y, int layer = kPicture) const;
+  /// Mean of a layer with its sign.
+  Color signed_mean(int x, int y, int layer) const;
+
+  /// Layer `a` beside layer `b`.
+  Comparison compare(int a, int b) const;
 
   std::uint32_t samples(int x, int y) const {
     const Pixel& pixel = pixels_[pixel_index(x, y)];
@@ -86,6 +100,8 @@ class Film {
     double sum[2][3] = {{0, 0, 0}, {0, 0, 0}};
     std::uint32_t count[2] = {0, 0};
   };
+
+  Color picture_mean(int x, int y) const;
 
   std::size_t pixel_index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);

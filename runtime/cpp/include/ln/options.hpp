@@ -33,12 +33,13 @@ struct Options {
   std::string stats_path, preview_path, environment_path;  // empty: none
   ProgressMode progress = ProgressMode::automatic;
   Units units = Units::radiometric;
+  int lightmap_side = 512;  // texels
   std::vector<const char*> unused;  // options that were given, though this network has nothing to do with them
 };
 
 inline constexpr std::uint32_t kDefaultSamples = 64, kDefaultProbeSamples = 1024;
 inline constexpr int kDefaultSide = 640;
-inline constexpr int kLargestSide = 65'536;
+inline constexpr int kLargestSide = 65'536, kLargestLightmap = 16'384;
 inline constexpr std::int64_t kMostPixels = std::int64_t{1} << 28;
 
 /// Thrown by parse_options for --help and --version: print `text` on standard output and exit with 0.

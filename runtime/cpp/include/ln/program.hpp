@@ -52,6 +52,13 @@ struct LayerInfo {
   const char* name;
   const char* light_paths = "";
   const char* file = nullptr;  // a tap: a picture of its own instead of a layer
+  bool is_signed = false;      // it holds negative values, too; taps only
+};
+
+/// Two wires that are compared, by the layers that show them.
+struct DifferenceInfo {
+  const char* name;
+  int a, b;
 };
 
 /// A wire that is written to a file as it is stored.
@@ -69,6 +76,13 @@ struct ProbeInfo {
   bool on_surfaces = false;  // the wire is known on surfaces only, not in free space
 };
 
+/// A wire whose irradiance is baked onto the surfaces.
+struct LightmapInfo {
+  const char* wire;
+  const char* light_paths;
+  const char* file;
+};
+
 struct ProgramInfo {
   const char* network;
   const char* source_file;  // the .ln file's name without its folder
@@ -77,8 +91,11 @@ struct ProgramInfo {
   std::span<const NodeInfo> nodes = {};
   std::span<const LayerInfo> layers = {};
   bool subtracts = false;  // some wire is subtracted, so samples may be negative
+  std::span<const DifferenceInfo> differences = {};
+  bool shows_difference = false;  // the picture is |a - b|
   std::span<const TapInfo> taps = {};
   std::span<const ProbeInfo> probes = {};
+  std::span<const LightmapInfo> lightmaps = {};
   bool has_image = true;
   std::span<const SkipRule> skip_rules = {};
   std::span<const int> path_tags = {};  // numbers of the tags that the letters of skip_rules tell apart

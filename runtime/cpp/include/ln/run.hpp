@@ -5,8 +5,9 @@
 //   void prepare(PrepareStep& step)              work before the picture: step(node id, [&](PrepareContext&) { ... }) each
 //   Color image(Request&) const                  what the eye gets from a surface point; a template
 //   static constexpr int emitters_layer          the layer that shows the emitters that are seen; -1: none does
+//   static constexpr bool shows_emitters         is what is seen of the emitters part of the picture?
 //   void write_taps(Write&& write) const         write(i, what is stored) for each TapInfo; a template
-//   auto probes() const                          for each probe, in order, what evaluates its wire: a tuple
+//   auto measured() const                        what evaluates the wires of all probes, then of all lightmaps: a tuple
 
 #include <atomic>
 #include <memory>
@@ -17,6 +18,7 @@
 
 #include "ln/camera.hpp"
 #include "ln/film.hpp"
+#include "ln/lightmap.hpp"
 #include "ln/operator.hpp"
 #include "ln/prepare.hpp"
 #include "ln/probe.hpp"
@@ -73,12 +75,14 @@ class NetworkRun : public RunCallbacks {
  protected:
   virtual void prepare_network(PrepareStep& step) = 0;
   virtual void write_taps() {}
-  virtual void measure_tile(std::size_t /*probe*/, const Tile&, Film&) {}
+  /// Samples of probe `number`, or of lightmap `number` less the number of probes.
+  virtual void measure_tile(std::size_t /*number*/, const Tile&, Film&) {}
 
   const Scene& scene() const { return *scene_; }
   const CameraRays& camera() const { return camera_; }
   PictureSize size() const { return size_; }
-  Probe& probe(std::size_t i) { return probes_[i]; }
+  std::vector<Probe>& probes() { return probes_; }
+  std::vector<Lightmap>& lightmaps() { return lightmaps_; }
   TapFile tap_file(std::size_t i) const { return {program_.network, program_.taps[i], scene().data()}; }
   Tracer& tracer(int worker) { return tracers_[static_cast<std::size_t>(worker)]; }
   std::uint32_t seed_hash() const { return seed_hash_; }
@@ -103,6 +107,7 @@ class NetworkRun : public RunCallbacks {
   std::vector<std::optional<std::string>> skipped_;  // by node: why
   std::vector<Tracer> tracers_;
   std::vector<Probe> probes_;
+  std::vector<Lightmap> lightmaps_;
   std::optional<NodeSampler> sampler_;
   std::uint32_t seed_hash_ = 0;
 };
@@ -114,7 +119,7 @@ LN_INLINE Color eye_radiance(const Network& network, Tracer& tracer, Ray ray, co
   const Scene& scene = tracer.scene();
   Color result(0), beta(1);
   const auto add_emitter = [&](const Color& light) {
-    result += light;
+    if constexpr (Network::shows_emitters) result += light;
     if constexpr (Network::emitters_layer >= 0) tracer.layers()[Network::emitters_layer] += light;
   };
   for (std::uint32_t depth = 0;; ++depth) {
@@ -171,11 +176,15 @@ class NetworkProgram final : public NetworkRun {
   }
 
   void measure_tile(std::size_t number, const Tile& tile, Film& film) override {
+    Tracer& tracer = this->tracer(tile.worker);
     std::size_t i = 0;
     const auto measure = [&](const auto& wire) {
-      if (i++ == number) this->probe(number).measure(tile, this->tracer(tile.worker), seed_hash(), wire, film);
+      if (i++ != number) return;
+      const std::size_t probes = this->probes().size();
+      if (number < probes) this->probes()[number].measure(tile, tracer, seed_hash(), wire, film);
+      else this->lightmaps()[number - probes].measure(tile, tracer, seed_hash(), wire, film);
     };
-    std::apply([&](const auto&... wire) { (measure(wire), ...); }, network_.probes());
+    std::apply([&](const auto&... wire) { (measure(wire), ...); }, network_.measured());
   }
 
  private:

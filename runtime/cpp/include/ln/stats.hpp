@@ -26,6 +26,12 @@ struct NodeStats {
   std::optional<std::string> skipped;  // the reason
 };
 
+/// Two wires that were compared; see Comparison.
+struct DifferenceStats {
+  std::string name;
+  double rel_mse = 0, bias = 0, largest = 0;
+};
+
 struct Stats {
   std::string network;
   std::string scene_file;
@@ -45,6 +51,7 @@ struct Stats {
   bool interrupted = false;
   std::optional<double> error_estimate;
   std::uint64_t repaired_samples = 0;
+  std::vector<DifferenceStats> differences;
 };
 
 /// The text of the --stats file.

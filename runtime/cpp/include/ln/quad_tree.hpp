@@ -80,6 +80,20 @@ class QuadTree {
     if (lit(face)) visit_leaves(roots_[face], patches_->domain(face / 2), visit);
   }
 
+  /// Area mean of the irradiance over the lit faces that `wanted(face)` accepts [W/m^2].
+  template <class Wanted>
+  Color mean(Wanted&& wanted) const {
+    DVec3 sum(0);
+    double whole = 0;
+    for (std::uint32_t face = 0; face < roots_.size(); ++face) {
+      if (!lit(face) || !wanted(face)) continue;
+      const auto a = static_cast<double>(area(patches_->surface(face / 2)));
+      sum += a * DVec3(nodes_[roots_[face]].value);
+      whole += a;
+    }
+    return whole > 0 ? Color(sum / whole) : Color(0);
+  }
+
   /// Integral of the irradiance over all surfaces, both sides [W / unit^2].
   DVec3 flux() const;
 

@@ -261,10 +261,10 @@ class _OperatorReader:
                         walk(part)
                 case ast.PathRepeat(part):
                     walk(part)
-                case ast.PathEvents(_, tag) if tag is not None:
-                    self._error(path.span, "a declaration tags only its parameters: via@from")
+                case ast.PathEvents(_, tag) if tag is not None and (tag.negated or kinds.get(tag.name) != "tags"):
+                    self._error(path.span, f"'@{tag.name}' is no tags parameter of this operator")
                 case ast.PathTagged():
-                    self._error(path.span, "a declaration tags only its parameters: via@from")
+                    self._error(path.span, "a declaration tags letters and path parameters: (D@from)+, via@from")
 
         if tail is not None:
             walk(tail)

@@ -268,7 +268,7 @@ class _Builder:
             fields=tuple(
                 (p.name, self.field(n, p))
                 for p in n.parameters
-                if not isinstance(p.value, PathValue) and p.name != "to"
+                if not isinstance(p.value, PathValue) and not (p.name == "to" and n.op.output == POINTS)
             ),
             inputs=tuple(argument for i in n.inputs for argument in self.arguments(n, i)),
             tables=tables,

@@ -248,8 +248,12 @@ def _fewest(a: int | None, b: int | None) -> int | None:
 
 
 def _filled(node: Node, tail: ast.PathExpression) -> ast.PathExpression:
-    """The tail with path parameters replaced by their values."""
+    """The tail with path and tags parameters replaced by their values."""
     match tail:
+        case ast.PathEvents(_, tag) if tag is not None:
+            chosen = node.parameter(tag.name)
+            name = chosen.value if chosen else None
+            return tail.changed(tag=tag.changed(name=name) if isinstance(name, str) else None)
         case ast.PathName(name):
             value = node.parameter(name)
             return value.value.expression if value and isinstance(value.value, PathValue) else tail

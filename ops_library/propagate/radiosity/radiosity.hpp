@@ -1,0 +1,29 @@
+#pragma once
+
+#include "ln/operator.hpp"
+#include "ln/radiosity.hpp"
+
+namespace ln::ops {
+
+/// Hierarchical radiosity; see radiosity.ln.
+struct Radiosity {
+  NodeId node;
+  float error = 0.01f;
+  float smallest = 0;  // [m]; 0: automatic
+  float residual = 1e-3f;
+  std::int64_t iterations = 200;
+  TagSet from = kAnyTag, to = kAnyTag;
+
+  void prepare(PrepareContext& context, const QuadTree& in) {
+    const auto unit = static_cast<float>(context.scene().data().unit);
+    tree_ = solve_radiosity(context, node, in, {error, smallest / unit, residual, iterations, from, to});
+  }
+
+  /// The QuadTree wire.
+  const QuadTree& quad_tree() const { return tree_; }
+
+  // State.
+  QuadTree tree_{};
+};
+
+}  // namespace ln::ops

@@ -1,0 +1,31 @@
+#pragma once
+// Hierarchical radiosity: diffuse interreflection between surfaces, from irradiance to irradiance.
+
+#include "ln/prepare.hpp"
+#include "ln/quad_tree.hpp"
+
+namespace ln {
+
+struct RadiosityOptions {
+  float error = 0.01f;     // of a link, as a share of the mean radiosity
+  float smallest = 0;      // cells of half this side are not made [normalised units]; 0: 1/128 of the scene's half diagonal
+  float residual = 1e-3f;  // bound of what further iterations would add, as a share of the result
+  std::int64_t iterations = 200;
+  TagSet from = kAnyTag;  // parts with one of these tags scatter
+  TagSet to = kAnyTag;    // parts with one of these tags receive
+};
+
+/// What it cost, and how far it got.
+struct RadiosityReport {
+  std::size_t elements = 0, links = 0, iterations = 0;
+  double residual = 0;
+  double mean_correction = 0;  // mean of |1 - sum of a leaf's form factors| over enclosed leaves that carry light
+};
+
+/// Solves E = K rho (E_in + E), with K the transport of radiosity to irradiance and rho the diffuse albedo: the multiply
+/// scattered light alone. The cells of `in` are those of the source's first scattering. Same seed, same bits for any number of
+/// threads.
+QuadTree solve_radiosity(PrepareContext& context, NodeId node, const QuadTree& in, const RadiosityOptions& options,
+                         RadiosityReport* report = nullptr);
+
+}  // namespace ln

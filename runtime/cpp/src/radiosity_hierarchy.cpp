@@ -1,0 +1,254 @@
+#include "radiosity_hierarchy.hpp"
+
+#include <algorithm>
+#include <glm/common.hpp>
+#include <numeric>
+
+#include "ln/diffuse_surface.hpp"
+
+namespace ln::radiosity {
+
+namespace {
+
+/// Sets that are joined, each known by its smallest member.
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
+
+  std::uint32_t find(std::uint32_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(std::uint32_t i, std::uint32_t j) {
+    i = find(i);
+    j = find(j);
+    parent_[std::max(i, j)] = std::min(i, j);
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+bool tagged(const Scene& scene, std::uint32_t part, TagSet tags) {
+  return tags == kAnyTag || (scene.part_tags(part) & tags) != 0;
+}
+
+}  // namespace
+
+Hierarchy::Hierarchy(PrepareContext& context, NodeId node, const QuadTree& in, const RadiosityOptions& options)
+    : context_(context), patches_(in.patches()), smallest_area_(4 * sqr(options.smallest > 0 ? options.smallest : 1.0f / 128)) {
+  find_faces(node, in, options);
+  if (faces.empty()) return;
+  std::vector<std::uint32_t> order(faces.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::vector<FlatCell> cells(faces.size());
+  elements.resize(faces.size());
+  for (std::size_t i = 0; i < faces.size(); ++i)
+    elements[i].flat = make_flat_cell(patches_.surface(faces[i].id / 2), Patches::is_front(faces[i].id));
+  if (faces.size() > 1) build(order, 0, static_cast<std::uint32_t>(faces.size()), kNoNode);
+  add_elements(in);
+  measure_albedo(0);
+}
+
+/// Casts rays from each face, to learn which faces exchange light at all, and which see nothing but surfaces.
+void Hierarchy::find_faces(NodeId node, const QuadTree& in, const RadiosityOptions& options) {
+  constexpr std::uint32_t kFewest = 16, kMost = 256;
+  constexpr float kAreaOfRay = 4e-4f;
+  const Scene& scene = context_.scene();
+  const auto count = static_cast<std::uint32_t>(patches_.face_count());
+  std::vector<std::vector<std::uint32_t>> seen(count);  // faces
+  enclosed_.assign(count, 1);
+  context_.for_chunks(count, 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
+    tracer.enter(node);
+    for (auto face = static_cast<std::uint32_t>(begin); face < end; ++face) {
+      const std::uint32_t patch = face / 2;
+      const float size = area(patches_.surface(patch));
+      if (!(size > 0)) continue;
+      const std::uint32_t rays = std::clamp(static_cast<std::uint32_t>(size / kAreaOfRay), kFewest, kMost);
+      const std::uint32_t key = hash32(face, node);
+      for (std::uint32_t i = 0; i < rays; ++i) {
+        SurfacePosition at;
+        scene.locate(patches_.hit(patch, patches_.domain(patch).point(sobol_point(key, 0, i))), at);
+        const Frame frame = make_frame(Patches::is_front(face) ? at.ng : -at.ng);
+        const Vec3 direction = frame.to_world(sample_cosine(sobol_point(key, 1, i)));
+        const Hit hit = tracer.intersect(spawn_ray(at, direction), hash32(key, i), node, RayKind::gather);
+        if (!hit.found()) {
+          enclosed_[face] = 0;
+          continue;
+        }
+        SurfacePosition there;
+        scene.locate(hit, there);
+        const std::uint32_t other = patches_.locate(hit.triangle, hit.u, hit.v).patch;
+        seen[face].push_back(Patches::face(other, glm::dot(direction, there.ng) < 0));
+      }
+      std::sort(seen[face].begin(), seen[face].end());
+      seen[face].erase(std::unique(seen[face].begin(), seen[face].end()), seen[face].end());
+    }
+  });
+  DisjointSets sets(count);
+  for (std::uint32_t face = 0; face < count; ++face)
+    for (const std::uint32_t other : seen[face]) sets.join(face, other);
+  std::vector<std::uint8_t> lit(count);
+  for (std::uint32_t face = 0; face < count; ++face)
+    if (in.lit(face)) lit[sets.find(face)] = 1;
+  for (std::uint32_t face = 0; face < count; ++face)
+    if (lit[sets.find(face)] && area(patches_.surface(face / 2)) > 0) add_face(face, options);
+}
+
+void Hierarchy::add_face(std::uint32_t id, const RadiosityOptions& options) {
+  const Scene& scene = context_.scene();
+  const std::uint32_t part = patches_.part(id / 2);
+  Face face;
+  face.id = id;
+  const bool diffuse = scatters_diffusely(scene, part, Patches::is_front(id));
+  face.scatters = diffuse && tagged(scene, part, options.from);
+  face.receives = face.scatters || (diffuse && tagged(scene, part, options.to));
+  face.enclosed = enclosed_[id] != 0;
+  face.albedo_varies = face.scatters && albedo_varies(scene, part);
+  if (face.scatters && !face.albedo_varies)
+    face.albedo = diffuse_albedo(scene, patches_.hit(id / 2, patches_.domain(id / 2).center()), Patches::is_front(id));
+  faces.push_back(face);
+}
+
+/// A cluster of the faces order[begin, end), at least two. Large faces are parted from small ones, so that no cluster is much
+/// larger than its things; others are halved in space.
+NodeRef Hierarchy::build(std::vector<std::uint32_t>& order, std::uint32_t begin, std::uint32_t end, NodeRef parent) {
+  if (end - begin == 1) {
+    faces[order[begin]].parent = parent;
+    return begin;  // the place of the face from now on
+  }
+  const auto number = static_cast<std::uint32_t>(clusters.size());
+  clusters.emplace_back();
+  Vec3 low(kInfinity), high(-kInfinity), low_center(kInfinity), high_center(-kInfinity);
+  float largest = 0;
+  Cluster cluster;
+  cluster.first = begin;
+  cluster.count = end - begin;
+  cluster.parent = parent;
+  for (std::uint32_t i = begin; i < end; ++i) {
+    const FlatCell& flat = elements[order[i]].flat;
+    for (int k = 0; k < flat.cell.corner_count(); ++k) {
+      low = glm::min(low, flat.cell.corner(k));
+      high = glm::max(high, flat.cell.corner(k));
+    }
+    low_center = glm::min(low_center, flat.cell.center());
+    high_center = glm::max(high_center, flat.cell.center());
+    largest = std::max(largest, flat.radius);
+    cluster.area += flat.area;
+    cluster.receives = cluster.receives || faces[order[i]].receives;
+  }
+  cluster.center = 0.5f * (low + high);
+  cluster.radius = 0.5f * glm::length(high - low);
+
+  const auto first = order.begin() + begin, last = order.begin() + end;
+  auto middle = first;
+  if (4 * largest > cluster.radius) {
+    middle = std::stable_partition(first, last, [&](std::uint32_t i) { return 4 * elements[i].flat.radius > cluster.radius; });
+  }
+  if (middle == first || middle == last) {
+    const Vec3 extent = high_center - low_center;
+    const std::size_t axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+    middle = first + (last - first) / 2;
+    std::nth_element(first, middle, last, [&](std::uint32_t i, std::uint32_t j) {
+      const float x = elements[i].flat.cell.center()[axis], y = elements[j].flat.cell.center()[axis];
+      return x != y ? x < y : i < j;
+    });
+    std::sort(first, middle);
+    std::sort(middle, last);
+  }
+  const auto split = static_cast<std::uint32_t>(middle - order.begin());
+  clusters[number] = cluster;
+  const NodeRef self = number | kClusterBit;
+  const NodeRef left = build(order, begin, split, self), right = build(order, split, end, self);
+  clusters[number].child[0] = left;
+  clusters[number].child[1] = right;
+  if (parent == kNoNode) {
+    std::vector<Face> sorted;
+    for (const std::uint32_t i : order) sorted.push_back(faces[i]);
+    faces = std::move(sorted);
+  }
+  return self;
+}
+
+/// Cells of the input, and the sums of areas.
+void Hierarchy::add_elements(const QuadTree& in) {
+  elements.clear();
+  elements.resize(faces.size());
+  area_before_.assign(1, 0);
+  for (std::uint32_t i = 0; i < faces.size(); ++i) {
+    Element& element = elements[i];
+    element.flat = make_flat_cell(patches_.surface(faces[i].id / 2), Patches::is_front(faces[i].id));
+    element.domain = patches_.domain(faces[i].id / 2);
+    element.face = i;
+    if (in.lit(faces[i].id)) element.source = in.nodes()[in.root(faces[i].id)].value;
+    area_before_.push_back(area_before_.back() + static_cast<double>(element.flat.area));
+  }
+  for (std::uint32_t i = 0; i < faces.size(); ++i) {
+    if (!in.lit(faces[i].id) || !faces[i].scatters) continue;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> open{{i, in.root(faces[i].id)}};  // element, node
+    for (std::size_t k = 0; k < open.size(); ++k) {
+      const auto [element, from] = open[k];
+      const QuadTreeNode& cell = in.nodes()[from];
+      if (cell.leaf()) continue;
+      divide(element);
+      for (std::uint32_t c = 0; c < 4; ++c) {
+        elements[elements[element].children + c].source = in.nodes()[cell.children + c].value;
+        open.emplace_back(elements[element].children + c, cell.children + c);
+      }
+    }
+  }
+}
+
+void Hierarchy::divide(std::uint32_t element) {
+  const auto first = static_cast<std::uint32_t>(elements.size());
+  elements[element].children = first;
+  const Element parent = elements[element];
+  for (int c = 0; c < 4; ++c) {
+    Element child;
+    child.domain = parent.domain.child(c);
+    child.flat = parent.flat;
+    child.flat.cell = parent.flat.cell.child(c);
+    child.flat.area *= 0.25f;
+    child.flat.radius *= 0.5f;
+    child.face = parent.face;
+    child.parent = element;
+    child.depth = parent.depth + 1;
+    child.source = parent.source;
+    child.albedo = parent.albedo;
+    elements.push_back(child);
+  }
+}
+
+void Hierarchy::measure_albedo(std::size_t first) {
+  constexpr std::uint32_t kSamples = 16;
+  const Scene& scene = context_.scene();
+  context_.workers().parallel_for(elements.size() - first, 64, [&](std::size_t i) {
+    Element& element = elements[first + i];
+    const Face& face = faces[element.face];
+    element.albedo = face.albedo;
+    if (!face.albedo_varies || !element.leaf()) return;
+    Color sum(0);
+    for (std::uint32_t k = 0; k < kSamples; ++k)
+      sum += diffuse_albedo(scene, patches_.hit(face.id / 2, element.domain.point(sobol_point(1, 0, k))),
+                            Patches::is_front(face.id));
+    element.albedo = sum / static_cast<float>(kSamples);
+  });
+}
+
+Hierarchy::Point Hierarchy::point(NodeRef n, float pick, const Vec2& u) const {
+  if (is_cluster(n)) {
+    const Cluster& c = clusters[cluster_index(n)];
+    const double begin = area_before_[c.first], end = area_before_[c.first + c.count];
+    const auto from = area_before_.begin() + c.first + 1, to = area_before_.begin() + c.first + c.count;
+    n = static_cast<NodeRef>(std::upper_bound(from, to, begin + static_cast<double>(pick) * (end - begin)) -
+                             area_before_.begin()) -
+        1;
+  }
+  const Element& element = elements[n];
+  Point p;
+  context_.scene().locate(patches_.hit(faces[element.face].id / 2, element.domain.point(u)), p.at);
+  p.normal = element.flat.normal;
+  return p;
+}
+
+}  // namespace ln::radiosity

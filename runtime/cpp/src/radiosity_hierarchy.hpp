@@ -1,0 +1,103 @@
+#pragma once
+// What radiosity exchanges light between: cells of faces, and clusters of faces.
+//
+// Only faces that can see, over however many others, one on which light arrives take part: not the inside of closed solids.
+// They are numbered by their places in the tree of clusters, so that a cluster holds a run of them; face i has element i as its
+// whole.
+
+#include <vector>
+
+#include "ln/form_factor.hpp"
+#include "ln/prepare.hpp"
+#include "ln/quad_tree.hpp"
+#include "ln/radiosity.hpp"
+
+namespace ln::radiosity {
+
+/// An element, or with the highest bit set a cluster.
+using NodeRef = std::uint32_t;
+inline constexpr NodeRef kClusterBit = 0x80000000u, kNoNode = 0xffffffffu;
+inline bool is_cluster(NodeRef n) { return (n & kClusterBit) != 0; }
+inline std::uint32_t cluster_index(NodeRef n) { return n & ~kClusterBit; }
+
+struct Face {
+  std::uint32_t id = 0;      // of Patches
+  NodeRef parent = kNoNode;  // cluster
+  bool receives = false;     // what arrives here is wanted, or scattered
+  bool scatters = false;
+  bool enclosed = false;  // every ray from it hits something
+  bool albedo_varies = false;
+  Color albedo{0};  // where it does not vary
+};
+
+/// A cell of a face. Elements stand behind their parents.
+struct Element {
+  FlatCell flat;
+  DomainCell domain;
+  std::uint32_t face = 0;  // number of the Face
+  std::uint32_t parent = kNoNode;
+  std::uint32_t children = 0;  // the first of four; 0: a leaf
+  int depth = 0;
+  Color source{0};  // irradiance that was there before [W/m^2]
+  Color albedo{0};  // of a leaf
+
+  bool leaf() const { return children == 0; }
+};
+
+struct Cluster {
+  Vec3 center{0};
+  float radius = 0, area = 0;
+  std::uint32_t first = 0, count = 0;  // faces
+  NodeRef child[2] = {kNoNode, kNoNode};
+  NodeRef parent = kNoNode;
+  bool receives = false;
+};
+
+class Hierarchy {
+ public:
+  Hierarchy(PrepareContext& context, NodeId node, const QuadTree& in, const RadiosityOptions& options);
+
+  bool empty() const { return faces.empty(); }
+  NodeRef root() const { return clusters.empty() ? NodeRef{0} : kClusterBit; }
+
+  Vec3 center(NodeRef n) const { return is_cluster(n) ? clusters[cluster_index(n)].center : elements[n].flat.cell.center(); }
+  float radius(NodeRef n) const { return is_cluster(n) ? clusters[cluster_index(n)].radius : elements[n].flat.radius; }
+  bool receives(NodeRef n) const {
+    return is_cluster(n) ? clusters[cluster_index(n)].receives : faces[elements[n].face].receives;
+  }
+
+  /// May the element be cut?
+  bool divisible(std::uint32_t element) const {
+    return !elements[element].leaf() ||
+           (elements[element].flat.area > smallest_area_ && elements[element].depth < QuadTree::kMaxDepth);
+  }
+  /// Cuts a leaf into four; the albedo of its children is to be measured.
+  void divide(std::uint32_t element);
+  /// Albedos of leaves from `first` on.
+  void measure_albedo(std::size_t first);
+
+  /// A point of an element or of a cluster, from two random points, and its normal.
+  struct Point {
+    SurfacePosition at;
+    Vec3 normal;
+  };
+  Point point(NodeRef n, float pick, const Vec2& u) const;
+
+  std::vector<Face> faces;
+  std::vector<Element> elements;
+  std::vector<Cluster> clusters;
+
+ private:
+  void find_faces(NodeId node, const QuadTree& in, const RadiosityOptions& options);
+  void add_face(std::uint32_t id, const RadiosityOptions& options);
+  NodeRef build(std::vector<std::uint32_t>& order, std::uint32_t begin, std::uint32_t end, NodeRef parent);
+  void add_elements(const QuadTree& in);
+
+  PrepareContext& context_;
+  const Patches& patches_;
+  float smallest_area_;
+  std::vector<std::uint8_t> enclosed_;  // by face of Patches
+  std::vector<double> area_before_;     // sum of the areas of the faces before
+};
+
+}  // namespace ln::radiosity

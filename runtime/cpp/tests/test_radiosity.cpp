@@ -1,0 +1,197 @@
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <doctest/doctest.h>
+
+#include "ln/form_factor.hpp"
+#include "ln/radiosity.hpp"
+#include "photon_scenes.hpp"
+#include "quad_tree_functions.hpp"
+
+using namespace ln;
+using namespace ln::test;
+
+namespace {
+
+/// Irradiance 1 on the fronts of the patches that `lit` names by their middle.
+template <class Lit>
+QuadTree light_on(const Stage& stage, Lit&& lit) {
+  const auto patches = std::make_shared<const Patches>(stage.scene.data());
+  QuadTree in(patches);
+  for (std::uint32_t p = 0; p < patches->size(); ++p)
+    if (lit(patches->surface(p).center())) in.set(Patches::face(p, true), {{Color(1)}});
+  return in;
+}
+const auto everywhere = [](const Vec3&) { return true; };
+
+struct Range {
+  double mean, low, high;
+};
+/// Irradiance (first channel) over the fronts whose middles `wanted` accepts.
+template <class Wanted>
+Range irradiance(const QuadTree& tree, Wanted&& wanted) {
+  double sum = 0, whole = 0, low = 1e30, high = -1e30;
+  for (std::uint32_t p = 0; p < tree.patches().size(); ++p) {
+    const SurfaceCell s = tree.patches().surface(p);
+    if (!wanted(s.center())) continue;
+    if (!tree.lit(2 * p)) low = std::min(low, 0.0);
+    tree.for_each_leaf(2 * p, [&](const DomainCell& cell, const Color& value) {
+      sum += static_cast<double>(area(surface_cell(s, cell)) * value.x);
+      low = std::min(low, static_cast<double>(value.x));
+      high = std::max(high, static_cast<double>(value.x));
+    });
+    whole += static_cast<double>(area(s));
+  }
+  return {sum / whole, low, high};
+}
+
+}  // namespace
+
+TEST_CASE("one reflection between two squares: albedo times the form factor") {
+  for (const bool parallel : {true, false}) {
+    CAPTURE(parallel);
+    SceneBuilder b;
+    const float h = 0.5f;
+    b.quad({-h, 0, h}, {h, 0, h}, {h, 0, -h}, {-h, 0, -h}, b.material(Color(0.5f, 0.25f, 1)));
+    if (parallel) {
+      b.quad({-h, 1, h}, {-h, 1, -h}, {h, 1, -h}, {h, 1, h}, b.material(Color(0)));
+    } else {
+      b.quad({-h, 0, -h}, {h, 0, -h}, {h, 1, -h}, {-h, 1, -h}, b.material(Color(0)));
+    }
+    // A black receiver cannot use irradiance; a nearly black one can.
+    b.data.materials.back().base_color = Color(1e-6f);
+    Stage stage(b.data);
+    const QuadTree out = solve_radiosity(stage.context, 1, light_on(stage, [](const Vec3& c) { return c.y == 0; }), {});
+    const Range found = irradiance(out, [](const Vec3& c) { return c.y > 0; });
+    CHECK(found.mean == doctest::Approx(0.5 * (parallel ? 0.199825 : 0.200044)).epsilon(0.005));
+    CHECK(irradiance(out, [](const Vec3& c) { return c.y == 0; }).mean < 1e-5);
+    CHECK(out.flux().y == doctest::Approx(0.5 * out.flux().x).epsilon(1e-4));
+    CHECK(out.flux().z == doctest::Approx(2 * out.flux().x).epsilon(1e-4));
+  }
+}
+
+TEST_CASE("in a closed space that is lit evenly: rho / (1 - rho), in corners and around obstacles too") {
+  for (const int shape : {0, 1, 2, 3}) {
+    CAPTURE(shape);
+    SceneBuilder b;
+    const std::uint32_t m = b.material(Color(0.5f, 0.8f, 0.1f));
+    if (shape == 0) b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), m);
+    if (shape == 1) b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), m, true, 6);
+    if (shape == 2) b.sphere(Vec3(0), 0.8f, m, true, 10);
+    if (shape == 3) {
+      b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), m);
+      b.box(Vec3(-0.2f, -0.35f, -0.1f), Vec3(0.1f, 0.1f, 0.15f), m, false);
+      b.box(Vec3(0.25f, -0.1f, -0.1f), Vec3(0.4f, 0.1f, 0.15f), m, false);
+    }
+    Stage stage(b.data);
+    RadiosityReport report;
+    const QuadTree out = solve_radiosity(stage.context, 1, light_on(stage, everywhere), {}, &report);
+    const Range found = irradiance(out, everywhere);
+    CHECK(found.mean == doctest::Approx(1).epsilon(0.005));
+    CHECK(found.low > 0.97);
+    CHECK(found.high < 1.03);
+    double area_lit = 0;
+    for (std::uint32_t p = 0; p < out.patches().size(); ++p) area_lit += static_cast<double>(area(out.patches().surface(p)));
+    CHECK(out.flux().y / area_lit == doctest::Approx(4).epsilon(0.005));
+    CHECK(out.flux().z / area_lit == doctest::Approx(1.0 / 9).epsilon(0.005));
+    CHECK(report.residual <= 1e-3);
+    CHECK(report.mean_correction < (shape == 1 ? 0.06 : 0.03));
+  }
+}
+
+TEST_CASE("energy is kept: what arrives is what leaves, from a single lit spot in a closed room with obstacles") {
+  SceneBuilder b;
+  const std::uint32_t m = b.material(Color(0.7f));
+  b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), m, true, 4);
+  b.box(Vec3(-0.2f, -0.35f, -0.1f), Vec3(0.1f, 0.1f, 0.15f), m, false);
+  b.box(Vec3(0.25f, -0.1f, -0.1f), Vec3(0.4f, 0.1f, 0.15f), m, false);
+  Stage stage(b.data);
+  const QuadTree in = light_on(stage, [](const Vec3& c) { return c.x == -0.5f && c.y > 0; });
+  const QuadTree out = solve_radiosity(stage.context, 1, in, {});
+  // All flux is reflected again and again: Phi_in rho / (1 - rho).
+  CHECK(out.flux().x == doctest::Approx(in.flux().x * 0.7 / 0.3).epsilon(0.02));
+  CHECK(irradiance(out, [](const Vec3& c) { return c.x == -0.5f; }).low > 0);
+}
+
+TEST_CASE("a wall casts its shadow") {
+  SceneBuilder b;
+  const std::uint32_t white = b.material(Color(1)), black = b.material(Color(1e-6f));
+  b.quad({-0.2f, 0, 0.2f}, {0.2f, 0, 0.2f}, {0.2f, 0, -0.2f}, {-0.2f, 0, -0.2f}, white);              // lit
+  b.quad({-0.8f, 0.8f, 0.5f}, {-0.8f, 0.8f, -0.5f}, {0.8f, 0.8f, -0.5f}, {0.8f, 0.8f, 0.5f}, black);  // above
+  b.quad({0, 0.4f, 0.5f}, {0.8f, 0.4f, 0.5f}, {0.8f, 0.4f, -0.5f}, {0, 0.4f, -0.5f}, black);          // between, right half
+  Stage stage(b.data);
+  const QuadTree out = solve_radiosity(stage.context, 1, light_on(stage, [](const Vec3& c) { return c.y == 0; }), {});
+  const auto above = [&](float x, float z) {
+    const Hit hit = stage.scene.accel().intersect({Vec3(x, 0.79f, z), Vec3(0, 1, 0), kInfinity}, 0);
+    return out.irradiance(hit.triangle, hit.u, hit.v, true).x;
+  };
+  // From a point above, the left half sees all of the lit square; the shadow's penumbra reaches to -0.2 and 0.2.
+  const FlatCell source = make_flat_cell(out.patches().surface(0), true);
+  for (const float x : {-0.7f, -0.4f, -0.25f})
+    CHECK(above(x, 0.1f) == doctest::Approx(point_form_factor({x, 0.8f, 0.1f}, {0, -1, 0}, source)).epsilon(0.05));
+  for (const float x : {0.25f, 0.4f, 0.7f}) CHECK(above(x, 0.1f) < 1e-4f);
+}
+
+TEST_CASE("the inside of a solid stays dark, and what carries no tag takes no part") {
+  SceneBuilder b;
+  b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f)));
+  const std::uint32_t small = b.material(Color(0.5f));
+  b.data.materials[small].name = "small";
+  b.box(Vec3(-0.1f), Vec3(0.1f), small, false);
+  b.data.materials[0].name = "wall";
+  const TagRule rules[] = {{0, "wall", TagRule::Kind::material, "wall"}, {1, "small", TagRule::Kind::material, "small"}};
+  Workers workers(2);
+  const Scene scene(b.data, rules, 2, nullptr);
+  PrepareContext context(scene, workers, 1, 4);
+  const auto patches = std::make_shared<const Patches>(scene.data());
+  QuadTree in(patches);
+  for (std::uint32_t p = 0; p < patches->size(); ++p) in.set(Patches::face(p, true), {{Color(1)}});
+  RadiosityOptions options;
+  const auto lit = [&](const QuadTree& tree, bool front) {
+    int walls = 0, things = 0;
+    for (std::uint32_t p = 0; p < patches->size(); ++p)
+      if (tree.lit(Patches::face(p, front))) ++(scene.data().parts[patches->part(p)].material == 0 ? walls : things);
+    return 100 * walls + things;
+  };
+  QuadTree out = solve_radiosity(context, 1, in, options);
+  CHECK(lit(out, true) == 606);
+  CHECK(lit(out, false) == 0);
+  options.to = 1;
+  CHECK(lit(solve_radiosity(context, 1, in, options), true) == 600);
+  options.to = 2;
+  CHECK(lit(solve_radiosity(context, 1, in, options), true) == 6);
+  options.from = 2;  // the box alone scatters, and sees walls only
+  const QuadTree direct = solve_radiosity(context, 1, in, options);
+  CHECK(direct.flux().x < 1e-6);
+  options.to = 1;
+  CHECK(solve_radiosity(context, 1, in, options).flux().x == doctest::Approx(0.5 * 6 * 0.04).epsilon(0.02));
+}
+
+TEST_CASE("the same bits for any number of threads") {
+  DVec3 flux[2];
+  for (const int threads : {1, 3}) {
+    SceneBuilder b;
+    b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), b.material(Color(0.5f)));
+    b.box(Vec3(-0.2f, -0.35f, -0.1f), Vec3(0.1f, 0.1f, 0.15f), b.material(Color(0.5f)), false);
+    Stage stage(b.data, threads);
+    flux[threads / 2] = solve_radiosity(stage.context, 1, light_on(stage, [](const Vec3& c) { return c.y > 0.2f; }), {}).flux();
+  }
+  CHECK(flux[0] == flux[1]);
+}
+
+TEST_CASE("rays and links grow much more slowly than the square of the number of surfaces") {
+  std::size_t links[2], rays[2];
+  const int pieces[] = {5, 20};
+  for (int i = 0; i < 2; ++i) {
+    SceneBuilder b;
+    b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), b.material(Color(0.5f)), true, pieces[i]);
+    Stage stage(b.data);
+    RadiosityReport report;
+    RadiosityOptions options;
+    options.error = 0.1f;
+    const QuadTree out = solve_radiosity(stage.context, 1, light_on(stage, everywhere), options, &report);
+    links[i] = report.links;
+    rays[i] = stage.context.rays(1, RayKind::shadow);
+    CHECK(out.flux().x == doctest::Approx(2 * (0.8 + 0.6 + 0.48)).epsilon(0.01));
+  }
+  CHECK(links[1] < 40 * links[0]);  // 16 times the surfaces, 256 times the pairs
+  CHECK(rays[1] < 40 * rays[0]);
+}

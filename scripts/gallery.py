@@ -128,8 +128,8 @@ def main() -> None:
             print(f"gallery: {exhibit.network}", flush=True)
             render(exhibit)
     head = (
-        "# Gallery\n\nEvery network of `examples/`: its graph (inserted converters are dashed), its picture, and the light on\n"
-        "each wire that the picture sums, with the same exposure. `scripts/gallery.py` makes this page."
+        "# Gallery\n\nEvery network of `examples/`: its graph (inserted converters are dashed), its picture, and\n"
+        "the light on each wire that the picture sums, with the same exposure. `scripts/gallery.py` makes this page."
     )
     sections = [section(e) for e in there if (IMAGES / f"{e.network}.json").exists()]
     (ROOT / "docs" / "gallery.md").write_text("\n\n".join([head, *sections]) + "\n", "utf-8")

@@ -485,7 +485,7 @@ class _Builder:
         found = []
         for p in n.parameters:
             d = p.declaration
-            if d.type in ("path", "tags") or (d.type == "text" and d.name == "layer"):
+            if d.type in ("path", "tags") or d.name == n.op.depth_parameter or (d.type == "text" and d.name == "layer"):
                 continue
             member = self.members[n.identifier]
             found.append(

@@ -13,7 +13,7 @@ network once
 light  = Lights()
 direct = Direct(light)
 pt     = PathTracer(direct + pt, max_depth = 2)
-expect L@area (D|G|S){0,3} E | L@delta (D|G) (D|G|S){0,2} E
+expect L S* E | L (D|G) S* E | L@area . .? (D|G) S* E | L@delta (D|G) .? (D|G) S* E
 image  direct + pt
 """
 

@@ -24,14 +24,17 @@ class Request {
   using Answer = Color;
   static constexpr Events receives = kReceives;
 
-  Request(Tracer& tracer, const SampleStream& random, const Interaction& at, const Color& beta, std::uint32_t depth, RayKind kind)
-      : tracer_(tracer), random_(random), at_(at), beta_(beta), depth_(depth), kind_(kind) {}
+  Request(Tracer& tracer, const SampleStream& random, const Interaction& at, const Color& beta, std::uint32_t depth, RayKind kind,
+          std::uint32_t steps = 0)
+      : tracer_(tracer), random_(random), at_(at), beta_(beta), depth_(depth), steps_(steps), kind_(kind) {}
 
   Tracer& tracer() { return tracer_; }
   const SampleStream& random() const { return random_; }
   const Interaction& at() const { return at_; }
   /// Number of surfaces between here and the eye.
   std::uint32_t depth() const { return depth_; }
+  /// Number of steps of recursion that led here.
+  std::uint32_t steps() const { return steps_; }
   /// Share of the answer that reaches the eye: for decisions (roulette, effort), never for results.
   const Color& beta() const { return beta_; }
   /// The point is seen by the eye, directly or by specular surfaces.
@@ -124,7 +127,7 @@ class Request {
   const SampleStream& random_;
   const Interaction& at_;
   Color beta_;
-  std::uint32_t depth_;
+  std::uint32_t depth_, steps_;
   RayKind kind_;
   bool sampled_ = false, valid_ = false, traced_ = false, given_ = false;
   union {

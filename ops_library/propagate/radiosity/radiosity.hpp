@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstdio>
+
 #include "ln/operator.hpp"
+#include "ln/progress.hpp"
 #include "ln/radiosity.hpp"
 
 namespace ln::ops {
@@ -16,7 +19,14 @@ struct Radiosity {
 
   void prepare(PrepareContext& context, const QuadTree& in) {
     const auto unit = static_cast<float>(context.scene().data().unit);
-    tree_ = solve_radiosity(context, node, in, {error, smallest / unit, residual, iterations, from, to});
+    RadiosityReport report;
+    tree_ = solve_radiosity(context, node, in, {error, smallest / unit, residual, iterations, from, to}, &report);
+    if (report.elements == 0) return;
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "radiosity: %zu cells, %zu links, %zu iterations; about %.2g %% of the light is still to come",
+                  report.elements, report.links, report.iterations, 100 * report.residual);
+    note(text);
   }
 
   /// The QuadTree wire.

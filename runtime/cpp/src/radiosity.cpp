@@ -82,7 +82,7 @@ class Solver {
 
   Verdict judge_elements(Link& link, float allowed, Tracer& tracer) const {
     const Element &r = shape_.elements[link.receiver], &s = shape_.elements[link.source];
-    if (r.face == s.face) return Verdict::drop;
+    if (r.face == s.face || !shape_.receives(link.receiver)) return Verdict::drop;
     const FormFactor f = form_factor(r.flat, s.flat);
     if (!(f.mean > 0) && !(f.spread > 0)) return Verdict::drop;
     const bool divide_r = shape_.divisible(link.receiver), divide_s = shape_.divisible(link.source);

@@ -38,7 +38,7 @@ struct IGCache {
     }
     const std::uint32_t key = hash32(request.random().bits(request.depth(), kRoulette));
     const Receiver where{at.hit, at.front, at.at.p, at.frame.n};
-    request.visit(IrradianceRecord{where.p, where.n, 0, sample(request.tracer(), where, key, 1, samples)}, 1);
+    request.visit(IrradianceRecord{where.p, where.n, 0, 0, sample(request.tracer(), where, key, 1, samples)}, 1);
   }
 
  private:

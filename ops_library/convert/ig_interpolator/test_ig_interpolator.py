@@ -53,9 +53,9 @@ def test_gradients_pay(compiled_network, picture):
     program = compiled_network("irradiance_gradients")
     options = ("--samples", "4", "--set", "samples.samples=600")
     truth, _ = picture(program, *options, "--set", "records.error=15%", size="24x18")
-    far = (*options, "--set", "records.error=60%", "--set", "records.farthest=50%")
+    far = (*options, "--set", "records.error=30%", "--set", "records.farthest=50%")
     errors = [
         np.abs(picture(program, *far, "--set", f"smooth.gradients={flag}", size="24x18")[0] / truth - 1).mean()
         for flag in ("true", "false")
     ]
-    assert errors[0] < 0.8 * errors[1]
+    assert errors[0] < 0.8 * errors[1], errors

@@ -33,7 +33,7 @@ std::uint32_t record_key(std::uint32_t key, std::size_t index) { return hash32(k
 }  // namespace
 
 void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sample) {
-  IrradianceRecord record{where.p, where.n, 0, sample};
+  IrradianceRecord record{where.p, where.n, 0, 0, sample};
 
   // Where irradiance changes fast, the record reaches less far.
   const Color E = sample.irradiance;
@@ -44,7 +44,9 @@ void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sampl
     return false;
   });
   const float low = spacing_.closest * where.footprint, high = spacing_.farthest * where.footprint;
-  record.reach = std::clamp(spacing_.error * distance, low, high);
+  constexpr float kLeast = 1.0f / 40;  // of the least reach: bounds the number of records in gaps
+  record.exact = std::max(kLeast * low, std::min(spacing_.error * distance, high));
+  record.reach = std::max(record.exact, low);
   record.sample.distance = record.reach / spacing_.error;
   limit_gradients(record.sample);
 
@@ -53,9 +55,10 @@ void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sampl
     if (glm::dot(near.n, record.n) <= 0.5f) return false;
     IrradianceRecord& other = records_[static_cast<std::size_t>(&near - records_.data())];
     const float limit = record.sample.distance + glm::distance(near.p, record.p);
+    other.exact = std::min(other.exact, spacing_.error * limit);
     if (other.sample.distance > limit) {
-      other.sample.distance = limit;
       other.reach = std::max(spacing_.error * limit, low);
+      other.sample.distance = other.reach / spacing_.error;
       limit_gradients(other.sample);
     }
     return false;
@@ -79,9 +82,14 @@ Color IrradianceRecords::mean_irradiance() const {
 }
 
 bool IrradianceRecords::covers(const Vec3& p, const Vec3& n) const {
-  bool found = false;
-  for_near(p, [&](const IrradianceRecord& record) { return found = error(record, p, n) < 1; });
-  return found;
+  constexpr float kEnough = 0.1f;  // one record suffices, unless it is far out of its depth, as those in narrow gaps are
+  float sum = 0;
+  for_near(p, [&](const IrradianceRecord& record) {
+    const float e = error(record, p, n);
+    if (e < 1) sum += weight(record, p, e, kOverlap);
+    return sum > kEnough;
+  });
+  return sum > kEnough;
 }
 
 /// A record is in all cells that it may reach of the level whose cells are just as wide as that.

@@ -56,7 +56,7 @@ TEST_CASE("the octree finds the records that a search of all finds") {
     for (const IrradianceRecord& record : records.records()) {
       const Vec3 d = p - record.p;
       const float e = std::sqrt(glm::dot(d, d) + sqr(4 * d.y)) / record.reach;
-      if (e < 1.4f) expected += 1 - e / 1.4f;
+      if (e < 1.4f) expected += (1 - e / 1.4f) * std::min(1.0f, record.exact / glm::length(d));
     }
     records.visit(p, n, 1.4f, [&](const IrradianceRecord&, float w) { found += w; });
     CHECK(found == doctest::Approx(expected).epsilon(1e-4));
@@ -93,6 +93,22 @@ TEST_CASE("records of another side or another level are not used") {
   CHECK(records.covers(Vec3(0.15f, 0, 0), Vec3(0, 1, 0)));
   CHECK_FALSE(records.covers(Vec3(0), Vec3(0, -1, 0)));
   CHECK_FALSE(records.covers(Vec3(0, 0.1f, 0), Vec3(0, 1, 0)));
+}
+
+TEST_CASE("a dark record in a gap, used farther away than it should be, gives way to its neighbours") {
+  IrradianceRecords records(RecordSpacing{0.2f, 0.02f, 0.3f});
+  records.add(receiver(Vec3(0)), seen(1e-3f, 0));
+  records.add(receiver(Vec3(0.03f, 0, 0)), seen(1, 1));
+  const auto irradiance = [&](const Vec3& p) {
+    float sum = 0, weight = 0;
+    records.visit(p, Vec3(0, 1, 0), IrradianceRecords::kOverlap, [&](const IrradianceRecord& record, float w) {
+      sum += w * record.sample.irradiance.x;
+      weight += w;
+    });
+    return sum / weight;
+  };
+  CHECK(irradiance(Vec3(0)) < 0.2f);
+  CHECK(irradiance(Vec3(0.012f, 0, 0)) > 0.9f);
 }
 
 TEST_CASE("covering: all places are covered, sparsely, the same for any number of threads") {

@@ -20,7 +20,8 @@ struct Receiver {
 
 struct IrradianceRecord {
   Vec3 p{0}, n{0, 0, 1};
-  float reach = 0;  // distance at which the error of using the record has grown to what is allowed
+  float exact = 0;  // distance at which the error of using the record has grown to what is allowed
+  float reach = 0;  // the same, kept within bounds: how far the record is used at all
   IrradianceSample sample;
 
   /// Irradiance at a point near the record, extrapolated by its gradients.
@@ -53,18 +54,19 @@ class IrradianceRecords {
 
   Color mean_irradiance() const;
 
-  /// Is there a record whose error at the point is allowed?
+  /// Do the records whose error at the point is allowed weigh enough?
   bool covers(const Vec3& p, const Vec3& n) const;
 
   /// Calls `visit(record, weight)` for records near the point, weights falling linearly to 0 with the error (Tabellion and
-  /// Lamorlette 2004). `limit` <= kFar: the error at which they get there, in units of what is allowed. False: there are none.
+  /// Lamorlette 2004). `limit` <= kFar: the error at which they get there, in units of what is allowed. A record that is used
+  /// farther away than it should be, as records in corners and gaps are, gives way to others. False: there are none.
   template <class Visit>
   bool visit(const Vec3& p, const Vec3& n, float limit, Visit&& visit) const {
     bool any = false;
     for_near(p, [&](const IrradianceRecord& record) {
       const float e = error(record, p, n);
       if (e >= limit) return false;
-      visit(record, 1 - e / limit);
+      visit(record, weight(record, p, e, limit));
       any = true;
       return false;
     });
@@ -91,6 +93,10 @@ class IrradianceRecords {
     const float off = 4 * glm::dot(d, record.n + n) * 0.5f;
     const float turned = safe_sqrt(1 - glm::dot(n, record.n));
     return std::sqrt(glm::dot(d, d) + off * off) / record.reach + turned / spacing_.error;
+  }
+
+  static float weight(const IrradianceRecord& record, const Vec3& p, float e, float limit) {
+    return (1 - e / limit) * record.exact / std::max(record.exact, glm::distance(p, record.p));
   }
 
   /// Calls `use(record)` for all records that may reach `p`, until it says true.

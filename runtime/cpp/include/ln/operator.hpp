@@ -7,6 +7,7 @@
 //
 //   Points       template <class Request, class In...> Color answer(Request&, const In&...) const
 //                (an operator that bounds a recursion reads its input from a function marked LN_NOINLINE, all else is inlined)
+//   pulled       the same for the representation's own kind of request, which names what is answered: Request::Answer
 //   otherwise    an accessor that its consumers know, e.g. const Emitters& emission() const
 //
 // and, if it works before the picture, void prepare(PrepareContext&, const In&...), called once, in schedule order, with

@@ -34,24 +34,24 @@ class Exhibit:
 
     network: str
     scene: str = "cornell_box.gltf"
-    samples: int = 64
+    samples: int = 32
     taps: tuple[str, ...] = ()
     exposure: float = 0
 
 
 EXHIBITS = (
     Exhibit("direct"),
-    Exhibit("path_tracing", "mirror_glass.glb", 512),
+    Exhibit("path_tracing", "mirror_glass.glb", 256),
     Exhibit("caustics", "mirror_glass.glb"),
     Exhibit("photon_density", "closed_box.gltf"),
     Exhibit("density_estimation"),
     Exhibit("radiosity"),
     Exhibit("final_gather"),
-    Exhibit("composite", "cylinder_figure4.glb"),
+    Exhibit("composite", "cylinder_figure4.glb", 16),
     Exhibit("irradiance_gradients"),
     Exhibit("gather_irradiance_gradients"),
-    Exhibit("photon_map", "mirror_glass.glb"),
-    Exhibit("tagged", "glossy_tags.glb"),
+    Exhibit("photon_map", "mirror_glass.glb", 16),
+    Exhibit("tagged", "glossy_tags.glb", 16),
     Exhibit("difference"),
 )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from lnc.paths.automaton import STATE_LIMIT, Dfa, EventTable, Nfa, TooLarge, determinise
 from lnc.source import SourceFile, Span
@@ -151,6 +152,7 @@ def _fresh(nfa: Nfa, start: int) -> int:
     return state
 
 
+@lru_cache(4096)
 def path_dfa(path: ast.PathExpression | None, alphabet: Alphabet) -> Dfa:
     """The minimal automaton of a path expression. Raises TooLarge."""
     nfa = Nfa()

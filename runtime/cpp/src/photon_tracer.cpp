@@ -1,11 +1,14 @@
 #include "ln/photon_tracer.hpp"
 
+#include <algorithm>
 #include <atomic>
+#include <optional>
 #include <string>
 
 #include "ln/error.hpp"
 #include "ln/material.hpp"
 #include "ln/request.hpp"
+#include "ln/secondary_sources.hpp"
 #include "ln/stats.hpp"
 
 namespace ln {
@@ -57,17 +60,34 @@ struct EventGroup {
   int state = -1;
 };
 
+/// Parts where a path of the expression can have its first event.
+std::vector<bool> starting_parts(const Scene& scene, const PathAutomaton& via, const std::vector<bool>& live) {
+  const SceneData& data = scene.data();
+  std::vector<bool> can_start(data.parts.size());
+  for (std::uint32_t p = 0; p < data.parts.size(); ++p) {
+    const Events events = possible_events(data, data.materials[data.parts[p].material]);
+    for (int e = 0; e < kEventCount; ++e) {
+      const int next = via.after(0, e, tag_mask(scene.part_tags(p), via.tags, via.tag_count));
+      if (any(events & kLetters[e]) && next >= 0 && live[next]) can_start[p] = true;
+    }
+  }
+  return can_start;
+}
+
+/// Where the particle of these random numbers starts.
+using ParticleSource = FunctionRef<PhotonEmission(Tracer&, const SampleStream&)>;
+
 /// The photons of a run of particles.
 class ParticleChunk {
  public:
-  ParticleChunk(Tracer& tracer, NodeId node, const Emitters& light, const PathAutomaton& via, const std::vector<bool>& live,
+  ParticleChunk(Tracer& tracer, NodeId node, const ParticleSource& source, const PathAutomaton& via, const std::vector<bool>& live,
                 double count, std::vector<Photon>& hits)
-      : tracer_(tracer), scene_(tracer.scene()), node_(node), light_(light), via_(via), live_(live), share_(static_cast<float>(1 / count)),
+      : tracer_(tracer), scene_(tracer.scene()), node_(node), source_(source), via_(via), live_(live), share_(static_cast<float>(1 / count)),
         hits_(hits) {}
 
   void trace(const SampleStream& random) {
     ++ledger_.particles;
-    const PhotonEmission start = light_.emit(random.get1(kBsdfLobe), random.get2(kOwn), random.get2(kBsdfDirection));
+    const PhotonEmission start = source_(tracer_, random);
     Color flux = start.flux * share_;
     ledger_.emitted += DVec3(flux);
     const float full = max_component(flux);
@@ -197,7 +217,7 @@ class ParticleChunk {
   Tracer& tracer_;
   const Scene& scene_;
   const NodeId node_;
-  const Emitters& light_;
+  const ParticleSource& source_;
   const PathAutomaton& via_;
   const std::vector<bool>& live_;
   const float share_;
@@ -207,14 +227,16 @@ class ParticleChunk {
 
 std::string mebibytes(double bytes) { return std::to_string(static_cast<std::uint64_t>(bytes / (1 << 20)) + 1) + " MiB"; }
 
-}  // namespace
+/// Key of the random numbers of an operator, for one `purpose`.
+std::uint32_t stream_key(const PrepareContext& context, NodeId node, std::uint32_t purpose) {
+  const std::uint64_t seed = context.seed();
+  return hash32(hash32(static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)), purpose + node);
+}
 
-Photons trace_photons(PrepareContext& context, NodeId node, const Emitters& light, const PathAutomaton& via, std::uint64_t count) {
+Photons trace_particles(PrepareContext& context, NodeId node, const ParticleSource& source, const PathAutomaton& via,
+                        const std::vector<bool>& live, std::uint64_t count) {
   constexpr std::uint64_t kChunk = 4096;
-  const std::vector<bool> live = live_states(via);
   Photons result;
-  if (light.empty() || count == 0 || !live[0]) return result;
-
   const std::uint64_t limit = available_memory_bytes() / kMemoryShare;
   const auto refuse_beyond_limit = [&](std::uint64_t photons) {
     const double bytes = static_cast<double>(photons) * sizeof(Photon);
@@ -231,12 +253,10 @@ Photons trace_photons(PrepareContext& context, NodeId node, const Emitters& ligh
   };
   std::vector<Chunk> chunks((count - 1) / kChunk + 1);
   std::atomic<std::uint64_t> stored{0};
-  const std::uint64_t seed = context.seed();
-  const std::uint32_t key =
-      hash32(hash32(static_cast<std::uint32_t>(seed), static_cast<std::uint32_t>(seed >> 32)), 0x70686f74u + node);
+  const std::uint32_t key = stream_key(context, node, 0x70686f74u);
   context.for_chunks(count, kChunk, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
     Chunk& chunk = chunks[begin / kChunk];
-    ParticleChunk particles(tracer, node, light, via, live, static_cast<double>(count), chunk.hits);
+    ParticleChunk particles(tracer, node, source, via, live, static_cast<double>(count), chunk.hits);
     for (std::size_t i = begin; i < end; ++i) particles.trace(SampleStream(key, static_cast<std::uint32_t>(i)));
     chunk.ledger = particles.ledger();
     refuse_beyond_limit(stored += chunk.hits.size());
@@ -250,6 +270,37 @@ Photons trace_photons(PrepareContext& context, NodeId node, const Emitters& ligh
     result.ledger += chunk.ledger;
   }
   return result;
+}
+
+}  // namespace
+
+Photons trace_photons(PrepareContext& context, NodeId node, const Emitters& light, const PathAutomaton& via, std::uint64_t count) {
+  const std::vector<bool> live = live_states(via);
+  if (light.empty() || count == 0 || !live[0]) return {};
+
+  std::optional<PhotonAim> aim;
+  if (!via.accepting[0]) {
+    const std::vector<bool> wanted = starting_parts(context.scene(), via, live);
+    const auto number = std::count(wanted.begin(), wanted.end(), true);
+    if (number == 0) return {};
+    if (static_cast<std::size_t>(number) < wanted.size()) aim.emplace(context.scene().data(), wanted);
+  }
+  const auto emit = [&](Tracer&, const SampleStream& random) {
+    return light.emit(random.get1(kBsdfLobe), random.get2(kOwn), random.get2(kBsdfDirection), aim ? &*aim : nullptr);
+  };
+  return trace_particles(context, node, emit, via, live, count);
+}
+
+Photons trace_secondary_photons(PrepareContext& context, NodeId node, const RadianceSource& source, const PathAutomaton& via,
+                                std::uint64_t count) {
+  const std::vector<bool> live = live_states(via);
+  if (count == 0 || !live[0]) return {};
+  const SecondarySources sources(context, source, stream_key(context, node, 0x70696c6fu), count / 16);
+  if (sources.empty()) return {};
+  // Other random numbers than those of the particles' ways, for the source may use any of them.
+  const std::uint32_t key = stream_key(context, node, 0x7365636fu);
+  const auto emit = [&](Tracer& tracer, const SampleStream& random) { return sources.emit(tracer, SampleStream(key, random.index())); };
+  return trace_particles(context, node, emit, via, live, count);
 }
 
 }  // namespace ln

@@ -140,3 +140,135 @@ TEST_CASE("more photons than memory holds are refused") {
   Stage stage(room());
   CHECK_THROWS_AS(trace<AnyPath>(stage, std::uint64_t{1} << 42), Error);
 }
+
+namespace {
+
+struct AllButFirst {  // S*: what aiming must not be used for, as the empty path is one of it
+  static constexpr int next[][3] = {{-1, -1, 0}};
+  static constexpr bool accepting[] = {true};
+};
+
+/// Total flux (first channel) of the photons of each of `runs` seeds: mean and standard error.
+struct Statistic {
+  double mean = 0, error = 0;
+};
+template <class Measure>
+Statistic over_seeds(const SceneData& data, const Image* environment, Measure&& measure) {
+  constexpr int kRuns = 24;
+  double sum = 0, sum2 = 0;
+  for (std::uint64_t seed = 0; seed < kRuns; ++seed) {
+    Workers workers(2);
+    const Scene scene(data, {}, 2, environment);
+    PrepareContext context(scene, workers, seed, 4);
+    const double x = measure(context, scene);
+    sum += x;
+    sum2 += x * x;
+  }
+  const double mean = sum / kRuns;
+  return {mean, std::sqrt(std::max(sum2 / kRuns - mean * mean, 0.0) / (kRuns - 1))};
+}
+
+}  // namespace
+
+TEST_CASE("aiming changes the number of photons behind mirrors, not their flux") {
+  const auto base = [] {
+    SceneBuilder b;
+    b.quad({-0.7f, -0.5f, 0.7f}, {0.7f, -0.5f, 0.7f}, {0.7f, -0.5f, -0.7f}, {-0.7f, -0.5f, -0.7f}, b.material(Color(0.5f)));
+    b.sphere({0.3f, -0.3f, 0.2f}, 0.15f, b.mirror(), false, 12);
+    b.quad({-0.6f, -0.4f, -0.3f}, {-0.3f, -0.4f, -0.3f}, {-0.3f, -0.1f, -0.4f}, {-0.6f, -0.1f, -0.4f}, b.mirror({0.9f, 0.5f, 0.4f}));
+    return b;
+  };
+  Image sky;
+  sky.width = 4, sky.height = 2, sky.channels = 3;
+  sky.floats = {1, 1, 1, 2, 2, 2, 0.5f, 0.5f, 0.5f, 1, 1, 1, 0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0, 0};
+  for (const int kind : {0, 1, 2, 3, 4}) {
+    CAPTURE(kind);
+    SceneBuilder b = base();
+    if (kind == 0) {
+      b.quad({-0.1f, 0.5f, -0.1f}, {0.1f, 0.5f, -0.1f}, {0.1f, 0.5f, 0.1f}, {-0.1f, 0.5f, 0.1f}, b.material({0, 0, 0}, {5, 4, 3}));
+      b.data.materials.back().double_sided = true;
+    }
+    if (kind == 3) b.directional({0.3f, -1, 0.1f}, Color(2));
+    if (kind == 1 || kind == 2) {
+      PunctualLight light;
+      light.kind = kind == 1 ? PunctualKind::point : PunctualKind::spot;
+      light.position = {0, 0.4f, 0};
+      light.direction = glm::normalize(Vec3(0.4f, -1, 0.2f));
+      light.intensity = Color(3);
+      light.cos_inner = 0.95f;
+      light.cos_outer = 0.7f;
+      b.data.lights.push_back(light);
+    }
+    double aimed_hits = 0, blind_hits = 0;
+    const auto trace_with = [](PrepareContext& context, const Scene& scene, const PathAutomaton& via) {
+      return trace_photons(context, 1, scene.emitters(), via, 4000);
+    };
+    const Image* environment = kind == 4 ? &sky : nullptr;
+    const Statistic aimed = over_seeds(b.data, environment, [&](PrepareContext& context, const Scene& scene) {
+      const Photons photons = trace_with(context, scene, path_automaton<SpecularPath>());
+      aimed_hits += static_cast<double>(photons.hits.size());
+      const PhotonLedger& l = photons.ledger;
+      CHECK(relative(l.emitted.x + l.roulette_gain.x, l.absorbed.x + l.escaped.x + l.roulette_loss.x) < 1e-12);
+      return total_flux(photons).x;
+    });
+    const Statistic blind = over_seeds(b.data, environment, [&](PrepareContext& context, const Scene& scene) {
+      const Photons all = trace_with(context, scene, path_automaton<AllButFirst>()), first = trace_with(context, scene, path_automaton<EmptyPath>());
+      blind_hits += static_cast<double>(all.hits.size()) - static_cast<double>(first.hits.size());
+      return total_flux(all).x - total_flux(first).x;
+    });
+    CHECK(aimed.mean > 0);
+    CHECK(std::abs(aimed.mean - blind.mean) < 4 * std::hypot(aimed.error, blind.error));
+    CHECK(blind.error < 0.05 * blind.mean);
+    CHECK(aimed.error < 0.7 * blind.error);
+    CHECK(aimed_hits > 1.5 * blind_hits);
+  }
+}
+
+TEST_CASE("without anything specular, particles for S+ are not traced at all") {
+  SceneBuilder b;
+  b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f), Color(1)));
+  Stage stage(b.data);
+  CHECK(trace<SpecularPath>(stage, 1000).hits.empty());
+  CHECK(stage.context.rays(1, RayKind::photon) == 0);
+}
+
+TEST_CASE("secondary sources send out what they say, wherever they are bright") {
+  SceneBuilder b;
+  b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f)), true, 1);
+  Stage stage(b.data);
+  const auto power = [&](const PathAutomaton& via, auto&& radiance) {
+    const auto source = [&](Tracer&, const SampleStream&, const Interaction& at) { return at.front ? radiance(at.at.p) : Color(0); };
+    const Photons photons = trace_secondary_photons(stage.context, 2, source, via, 100'000);
+    const PhotonLedger& l = photons.ledger;
+    CHECK(relative(l.emitted.x + l.roulette_gain.x, l.absorbed.x + l.escaped.x + l.roulette_loss.x) < 1e-12);
+    CHECK(l.escaped.x == 0);
+    CHECK(relative(l.emitted.x, total_flux(photons).x * (via.accepting[0] && via.next[0] < 0 ? 1 : 0.5)) < 0.01);
+    return l.emitted.x;
+  };
+  const auto even = [](const Vec3&) { return Color(1, 2, 3); };
+  const auto uneven = [](const Vec3& p) { return Color(p.x > 0.4f && p.y < -0.49f ? 100.0f : std::max(p.y, 0.0f)); };
+  const auto pi = static_cast<double>(kPi);
+  CHECK(power(path_automaton<EmptyPath>(), even) == doctest::Approx(6 * pi).epsilon(0.005));
+  CHECK(power(path_automaton<AnyPath>(), even) == doctest::Approx(6 * pi).epsilon(0.005));
+  // 100 on a strip of 0.1 x 1 of the floor and on 0.1 x 0.01 of two walls and 1 x 0.01 of a third; y on the ceiling and the upper half of four walls.
+  const double strip = 100 * (0.1 + 2 * 0.001 + 0.01), rest = 0.5 + 4 * 0.125;
+  CHECK(power(path_automaton<EmptyPath>(), uneven) == doctest::Approx(pi * (strip + rest)).epsilon(0.01));
+}
+
+TEST_CASE("secondary sources: a mirror's share of the light is not scattered diffusely; any number of threads, same photons") {
+  std::vector<std::vector<Photon>> hits;
+  for (const int threads : {1, 2, 5}) {
+    Stage stage(room(), threads);
+    const auto source = [](Tracer& tracer, const SampleStream& random, const Interaction& at) {
+      CHECK(any(at.bsdf().events() & Events::D));
+      static_cast<void>(tracer);
+      return Color(random.get1(1, kOwn));
+    };
+    hits.push_back(trace_secondary_photons(stage.context, 2, source, path_automaton<AnyPath>(), 5'000).hits);
+  }
+  REQUIRE(hits[0].size() > 1000);
+  for (int i : {1, 2}) {
+    REQUIRE(hits[0].size() == hits[i].size());
+    CHECK(std::memcmp(hits[0].data(), hits[i].data(), hits[0].size() * sizeof(Photon)) == 0);
+  }
+}

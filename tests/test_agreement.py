@@ -35,19 +35,6 @@ def test_photon_density_agrees_with_path_tracing(compiled_network, run_program):
     np.testing.assert_allclose(block_means(found, 6, 8), block_means(truth, 6, 8), rtol=0.06)
 
 
-@pytest.mark.parametrize("scene", ["cornell_box.gltf", "mirror_glass.glb"])
-def test_photon_map_agrees_with_path_tracing(compiled_network, run_program, scene):
-    """Jensen's algorithm holds all light of scenes that are diffuse or specular."""
-    pictures = []
-    for network, samples in (("path_tracing", "512"), ("photon_map", "32")):
-        run = run_program(compiled_network(network), SCENES / scene, *SIZE, "--samples", samples)
-        assert run.status == 0, run.stderr
-        pictures.append(exr.read(run.picture))
-    truth, found = pictures
-    assert found.mean() / truth.mean() == pytest.approx(1, rel=0.015)
-    np.testing.assert_allclose(block_means(found, 3, 4), block_means(truth, 3, 4), rtol=0.05)
-
-
 BY_PATHS = """
 network caustics_by_paths
 light    = Lights()

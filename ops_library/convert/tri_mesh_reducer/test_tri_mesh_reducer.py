@@ -38,5 +38,5 @@ def test_the_error_is_bounded_in_the_picture(compiled_network, run_program):
     exact = picture("0")
     for error in (0.05, 0.3):
         change = abs(picture(f"{error}") - exact).max()
-        # Radiance is albedo / pi times irradiance; the room's mean irradiance is about pi / albedo times the picture's mean.
+        # Radiance is albedo / pi times irradiance; the room's mean irradiance: about pi / albedo times the picture's.
         assert 0 < change < 1.5 * error * exact.mean()

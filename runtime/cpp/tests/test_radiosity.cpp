@@ -74,8 +74,8 @@ TEST_CASE("in a closed space that is lit evenly: rho / (1 - rho), in corners and
     SceneBuilder b;
     const std::uint32_t m = b.material(Color(0.5f, 0.8f, 0.1f));
     if (shape == 0) b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), m);
-    if (shape == 1) b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), m, true, 6);
-    if (shape == 2) b.sphere(Vec3(0), 0.8f, m, true, 10);
+    if (shape == 1) b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), m, true, 12);
+    if (shape == 2) b.sphere(Vec3(0), 0.8f, m, true, 16);
     if (shape == 3) {
       b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), m);
       b.box(Vec3(-0.2f, -0.35f, -0.1f), Vec3(0.1f, 0.1f, 0.15f), m, false);
@@ -179,14 +179,14 @@ TEST_CASE("the same bits for any number of threads") {
 
 TEST_CASE("rays and links grow much more slowly than the square of the number of surfaces") {
   std::size_t links[2], rays[2];
-  const int pieces[] = {5, 20};
+  const int pieces[] = {8, 32};
   for (int i = 0; i < 2; ++i) {
     SceneBuilder b;
     b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), b.material(Color(0.5f)), true, pieces[i]);
     Stage stage(b.data);
     RadiosityReport report;
     RadiosityOptions options;
-    options.error = 0.1f;
+    options.error = 0.05f;
     const QuadTree out = solve_radiosity(stage.context, 1, light_on(stage, everywhere), options, &report);
     links[i] = report.links;
     rays[i] = stage.context.rays(1, RayKind::shadow);

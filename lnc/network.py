@@ -245,6 +245,7 @@ class Schedule:
     probes: tuple[Probe, ...]
     lightmaps: tuple[Lightmap, ...]
     tags: tuple[Tag, ...]
+    wanted: tuple[str, ...]  # the wires that results are made of
 
     def node(self, name: str) -> ScheduledNode:
         return next(n for n in self.nodes if n.name == name)

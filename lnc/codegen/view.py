@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path, PurePath
 
+import lnc
 from lnc.codegen.languages import TagRuleView, tag_rules
 from lnc.codegen.names import cpp_string, float_literal, unique_names
 from lnc.diagnostics import InternalError
@@ -80,6 +83,14 @@ class SkipView:
 
 
 @dataclass(frozen=True)
+class CacheView:
+    """A node that may know its wire from an earlier run."""
+
+    network: str  # stands for the part of the network that leads to it
+    nodes: tuple[str, ...]  # the names of its nodes, whose parameters count
+
+
+@dataclass(frozen=True)
 class NodeView:
     member: str
     type_name: str
@@ -91,6 +102,8 @@ class NodeView:
     skip: str  # the flag that says that the node carries no light; empty: it always may
     receivers: str  # the tags that `to` restricts the wire to; empty: everywhere
     prepares: bool
+    guard: str  # a C++ condition for its preparation; empty: always
+    cache: CacheView | None
     name: str
     op: str
     line: int
@@ -223,6 +236,7 @@ class _Builder:
             [n.identifier for n in schedule.nodes if n.name in light.conditions], "skip_", self.members.values()
         )
         self.by_name = {n.name: n for n in schedule.nodes}
+        self.needed = self.upstream(schedule.wanted, through_caches=False)
         self.tag_bits = {tag.name: i for i, tag in enumerate(schedule.tags)}
         self.layers: list[LayerView] = []
         self.differences: list[DifferenceView] = []
@@ -275,6 +289,8 @@ class _Builder:
             skip=self.flags.get(n.identifier, ""),
             receivers="" if n.receivers is None else self.tag_set(n.receivers),
             prepares=n.prepares,
+            guard=self.guard(n),
+            cache=self.cache(n) if n.op.cached else None,
             name=n.name,
             op=n.op.name,
             line=n.line,
@@ -282,6 +298,56 @@ class _Builder:
             reason=n.reason,
             file=PurePath(n.file).name,
         )
+
+    # --- Caches -------------------------------------------------------------------------------------------------------
+
+    def upstream(self, names: Iterable[str], through_caches: bool) -> set[str]:
+        """The nodes with these names and all that they read; what caches read only where `through_caches`."""
+        found: set[str] = set()
+        stack = list(names)
+        while stack:
+            name = stack.pop()
+            if name not in found:
+                found.add(name)
+                if through_caches or not self.by_name[name].op.cached:
+                    stack += self.sources(self.by_name[name])
+        return found
+
+    def sources(self, n: ScheduledNode) -> list[str]:
+        return [term.node for i in n.inputs for term in i.terms]
+
+    def guard(self, n: ScheduledNode) -> str:
+        """When a node is to be prepared: if it carries light, and some cache that alone needs it has nothing stored."""
+        skip = self.flags.get(n.identifier)
+        conditions = [f"!{skip}"] if skip else []
+        if wanted := self.wanted(n):
+            conditions.append(wanted)
+        if n.op.cached:
+            conditions.append(f"{self.members[n.identifier]}.wanted()")
+        return " && ".join(conditions)
+
+    def wanted(self, n: ScheduledNode) -> str:
+        """The caches that a node serves, as a condition; empty if a result needs it, too."""
+        if n.name in self.needed:
+            return ""
+        served: list[str] = []
+        for cache in self.schedule.nodes:
+            if cache.op.cached and n.name in self.upstream(self.sources(cache), through_caches=False):
+                outer = self.wanted(cache)
+                served.append(f"{self.members[cache.identifier]}.wanted()" + (f" && {outer}" if outer else ""))
+        return f"({' || '.join(served)})" if len(served) > 1 else "".join(served)
+
+    def cache(self, n: ScheduledNode) -> CacheView:
+        """What a cached wire is made from; operators count with their source, for they may be changed."""
+        names = self.upstream(self.sources(n), through_caches=True)
+        nodes = [self.by_name[name] for name in sorted(names) if not self.by_name[name].op.cached]
+        lines = [lnc.__version__, *(f"{tag.name} {tag.globs}" for tag in self.schedule.tags)]
+        for node in nodes:
+            inputs = [(i.port.name, [(t.node, t.weight) for t in i.terms]) for i in node.inputs]
+            parameters = [(p.name, getattr(p.value, "text", p.value)) for p in node.parameters]
+            source = (Path(node.op.folder) / f"{node.op.file_stem}.hpp").read_bytes()
+            lines.append(f"{node.name} {node.op.name} {inputs} {parameters} {sha256(source).hexdigest()}")
+        return CacheView(sha256("\n".join(lines).encode()).hexdigest(), tuple(node.name for node in nodes))
 
     def skip(self, n: ScheduledNode) -> SkipView:
         """The condition of a node as tables; one too long for them becomes "always"."""

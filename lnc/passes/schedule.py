@@ -53,6 +53,7 @@ def schedule(network: Network, contents: dict[str, tuple[str, ...]]) -> Schedule
         probes=network.probes,
         lightmaps=network.lightmaps,
         tags=network.tags,
+        wanted=tuple(dict.fromkeys(term.node for _, terms in network.results() for term in terms)),
     )
 
 

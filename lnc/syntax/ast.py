@@ -350,6 +350,7 @@ class EqualDeclaration(Record):
 
 
 class PrepareDeclaration(Record):
+    cached: bool
     comments: Comments
     span: Span
 

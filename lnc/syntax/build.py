@@ -349,7 +349,7 @@ class Builder:
         return ast.EqualDeclaration(tuple(c.text for c in children), self._comments(span), span)
 
     def prepare(self, span: Span, children: Children) -> ast.PrepareDeclaration:
-        return ast.PrepareDeclaration(self._comments(span), span)
+        return ast.PrepareDeclaration(bool(children), self._comments(span), span)
 
     def overloads(self, span: Span, children: Children) -> ast.OverloadsDeclaration:
         return ast.OverloadsDeclaration(children[0].text, self._comments(span), span)

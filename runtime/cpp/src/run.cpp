@@ -86,6 +86,17 @@ void PrepareStep::operator()(NodeId node, FunctionRef<void(PrepareContext&)> wor
   seconds_[node] += watch.seconds();
 }
 
+CacheKey PrepareStep::cache_key(const char* network, std::initializer_list<const char*> nodes) {
+  if (!scene_) scene_ = fingerprint(context_.scene().data(), environment_);
+  CacheKey key{*scene_, {}, context_.seed()};
+  key.network.add(std::string_view(network));
+  for (const ParameterSlot& slot : run_.program.parameters) {
+    const auto same = [&](const char* name) { return std::string_view(name) == slot.node; };
+    if (std::any_of(nodes.begin(), nodes.end(), same)) key.network.add(std::string(slot.node) + "." + slot.name + "=" + parameter_text(slot));
+  }
+  return key;
+}
+
 NodeSampler::NodeSampler(const std::vector<Tracer>& tracers, std::size_t node_count) : seen_(node_count) {
   thread_ = std::thread([this, &tracers] {
     while (!stop_.load(std::memory_order_relaxed)) {
@@ -158,7 +169,7 @@ void NetworkRun::skip_dark_nodes() {
 }
 
 void NetworkRun::prepare(RunContext& context) {
-  PrepareStep step(*prepare_context_, context, prepare_seconds_);
+  PrepareStep step(*prepare_context_, context, prepare_seconds_, has_environment_ ? &environment_ : nullptr);
   prepare_network(step);
   sampler_.emplace(tracers_, program_.nodes.size());
 }

@@ -16,6 +16,7 @@
 #include <tuple>
 #include <vector>
 
+#include "ln/cache.hpp"
 #include "ln/camera.hpp"
 #include "ln/film.hpp"
 #include "ln/lightmap.hpp"
@@ -35,14 +36,26 @@ inline constexpr NodeId kEye = 0;
 /// Runs and times the preparation of one node after the other.
 class PrepareStep {
  public:
-  PrepareStep(PrepareContext& context, RunContext& run, std::vector<double>& seconds) : context_(context), run_(run), seconds_(seconds) {}
+  PrepareStep(PrepareContext& context, RunContext& run, std::vector<double>& seconds, const Image* environment)
+      : context_(context), run_(run), seconds_(seconds), environment_(environment) {}
+
+  /// Lets a cache look whether it has its wire from an earlier run. `network` stands for the part of the network that leads to it;
+  /// the parameters of its `nodes` count as they are now.
+  template <class Cache>
+  void open(Cache& cache, const char* network, std::initializer_list<const char*> nodes) {
+    cache.open(context_, cache_key(network, nodes));
+  }
 
   void operator()(NodeId node, FunctionRef<void(PrepareContext&)> work);
 
  private:
+  CacheKey cache_key(const char* network, std::initializer_list<const char*> nodes);
+
   PrepareContext& context_;
   RunContext& run_;
   std::vector<double>& seconds_;
+  const Image* environment_;
+  std::optional<Fingerprint> scene_;
 };
 
 /// Watches, from a thread of its own, which node each tracer is at, and so shares out the time of the picture.

@@ -1,0 +1,73 @@
+"""CachePhotons: the same picture without tracing again; and whatever is stale or damaged is said and made anew."""
+
+from pathlib import Path
+
+import pytest
+
+SCENES = Path(__file__).resolve().parents[3] / "examples" / "scenes"
+NETWORK = """
+network kept
+light   = Lights()
+photons = ParticleTracer(light, count = 5k)
+cached  = CachePhotons(photons, file = "photons.cache")
+density = NNDensity(cached, neighbours = 20)
+expect <= L (D|G|S)* E
+image  density
+"""
+OPTIONS = ("--size", "6x4", "--samples", "2")
+
+
+@pytest.fixture
+def kept(compiled_network, run_program, tmp_path):
+    """kept(scene, options...): the picture's bytes, whether photons were traced, and what was said."""
+
+    def run(scene="cornell_box.gltf", *options):
+        done = run_program(compiled_network("kept", text=NETWORK), SCENES / scene, *OPTIONS, *options)
+        assert done.status == 0, done.stderr
+        return done.picture.read_bytes(), done.stats["rays"]["photon"] > 0, done.stderr
+
+    return run
+
+
+def test_read_back(kept, tmp_path):
+    first, traced, said = kept()
+    assert traced and "cache" not in said
+    again, traced, said = kept("cornell_box.gltf", "--threads", "1")
+    assert again == first and not traced and "cache" not in said
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (("cornell_box.gltf", "--seed", "1"), "it was made with seed 0"),
+        (("cornell_box.gltf", "--set", "photons.count=6k"), "it was made by another network, or with other parameters"),
+        (("closed_box.gltf",), "it was made for another scene"),
+    ],
+)
+def test_stale(kept, options, reason):
+    kept()
+    _, traced, said = kept(*options)
+    assert traced and f"photons.cache: this cache is not used, {reason}; it is computed and written again" in said
+    _, traced, said = kept(*options)
+    assert not traced and "cache" not in said
+
+
+def test_damage(kept, tmp_path):
+    first, _, _ = kept()
+    cache = tmp_path / "photons.cache"
+    whole = cache.read_bytes()
+    damaged = [b"", b"not a cache at all, but long enough to be one" * 4, whole[:50], whole[:-1], whole + b"x"]
+    for place in (3, 9, 20, 40, 57, 70, 80, 90, 105, 200, len(whole) - 2):
+        damaged.append(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
+    for content in damaged:
+        cache.write_bytes(content)
+        picture, traced, said = kept()
+        assert picture == first and traced
+        assert "this cache is not used" in said
+        assert cache.read_bytes() == whole
+
+
+def test_a_cache_that_cannot_be_written_is_a_warning(kept, tmp_path):
+    (tmp_path / "photons.cache").mkdir()
+    _, traced, said = kept()
+    assert traced and "warning: photons.cache: " in said and "this cache is not kept" in said

@@ -1,0 +1,288 @@
+#include "ln/cache.hpp"
+
+#include <array>
+#include <cstring>
+
+#include "gltf_files.hpp"
+#include "ln/error.hpp"
+#include "ln/output_file.hpp"
+#include "ln/progress.hpp"
+#include "ln/text.hpp"
+
+namespace ln {
+
+namespace {
+
+constexpr char kMagic[8] = {'L', 'N', 'C', 'A', 'C', 'H', 'E', '\n'};
+constexpr std::uint32_t kVersion = 1;  // of everything below and of what encode() writes
+
+/// The beginning of the file.
+struct Header {
+  char magic[8];
+  std::uint32_t version;
+  char representation[20];
+  Fingerprint scene, network;
+  std::uint64_t seed;
+  std::uint64_t payload_size;
+  Fingerprint payload;
+  Fingerprint header;  // of everything before
+};
+static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 112, "no gaps");
+
+Fingerprint fingerprint(const Header& header) {
+  Fingerprint f;
+  f.add(&header, offsetof(Header, header));
+  return f;
+}
+
+Header make_header(std::string_view representation, const CacheKey& key, const std::string& payload) {
+  Header header{};
+  std::memcpy(header.magic, kMagic, sizeof kMagic);
+  header.version = kVersion;
+  representation.copy(header.representation, sizeof header.representation - 1);
+  header.scene = key.scene;
+  header.network = key.network;
+  header.seed = key.seed;
+  header.payload_size = payload.size();
+  header.payload.add(payload);
+  header.header = fingerprint(header);
+  return header;
+}
+
+void add(Fingerprint& f, const Color& c) {
+  for (std::size_t i = 0; i < 3; ++i) f.add(c[i]);
+}
+
+void add(Fingerprint& f, const TextureRef& t) {
+  f.add(t.image);
+  if (!t) return;
+  f.add(t.uv_set);
+  f.add(t.wrap_s);
+  f.add(t.wrap_t);
+  f.add(t.nearest);
+  add(f, t.row0);
+  add(f, t.row1);
+}
+
+void add(Fingerprint& f, const std::vector<std::string>& texts) {
+  f.add(std::uint64_t{texts.size()});
+  for (const std::string& text : texts) f.add(text);
+}
+
+void add(Fingerprint& f, const Material& m) {
+  f.add(m.name);
+  add(f, m.tags);
+  for (const Color& c : {m.base_color, m.emission, m.attenuation_color, m.specular_color}) add(f, c);
+  for (const float x : {m.alpha, m.metallic, m.roughness, m.normal_scale, m.alpha_cutoff, m.ior, m.transmission, m.attenuation_distance, m.specular}) f.add(x);
+  f.add(m.alpha_mode);
+  for (const bool x : {m.double_sided, m.unlit, m.solid}) f.add(x);
+  for (const TextureRef* t : {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.emissive_texture, &m.transmission_texture,
+                              &m.specular_texture, &m.specular_color_texture})
+    add(f, *t);
+}
+
+void add(Fingerprint& f, const Image& image) {
+  for (const int x : {image.width, image.height, image.channels}) f.add(x);
+  f.add(image.srgb);
+  f.add(image.bytes);
+  f.add(std::uint64_t{image.floats.size()});
+  f.add(image.floats.data(), image.floats.size() * sizeof(float));
+}
+
+}  // namespace
+
+// --- Fingerprints ----------------------------------------------------------------------------------------------------
+
+void Fingerprint::mix(std::uint64_t word) {
+  const auto stir = [](std::uint64_t x) {  // Stafford's variant 13 of the finaliser of MurmurHash3
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    return x ^ (x >> 31);
+  };
+  a_ = stir(a_ ^ word);
+  b_ = stir(b_ + word * 0x9e3779b97f4a7c15u) + a_;
+}
+
+void Fingerprint::add(const void* data, std::size_t size) {
+  const char* bytes = static_cast<const char*>(data);
+  for (; size >= 8; bytes += 8, size -= 8) {
+    std::uint64_t word;
+    std::memcpy(&word, bytes, 8);
+    mix(word);
+  }
+  if (size == 0) return;
+  std::uint64_t word = std::uint64_t{size} << 56;
+  std::memcpy(&word, bytes, size);
+  mix(word);
+}
+
+Fingerprint fingerprint(const SceneData& scene, const Image* environment) {
+  Fingerprint f;
+  for (const double x : {scene.origin.x, scene.origin.y, scene.origin.z, scene.unit}) f.add(x);
+  f.add(scene.positions);
+  f.add(std::uint64_t{scene.triangles.size()});
+  f.add(scene.triangles.data(), scene.triangles.size() * sizeof(UVec3));
+  f.add(scene.normals);
+  f.add(scene.tangents);
+  for (const auto& uvs : scene.uvs) f.add(uvs);
+  f.add(scene.colors);
+  for (const Part& part : scene.parts) {
+    for (const std::uint32_t x : {part.first_triangle, part.triangle_count, part.material}) f.add(x);
+    for (const bool x : {part.has_normals, part.has_colors, part.has_tangents}) f.add(x);
+    f.add(part.mesh);
+    f.add(part.node);
+    add(f, part.tags);
+  }
+  for (const Material& material : scene.materials) add(f, material);
+  for (const Image& image : scene.images) add(f, image);
+  for (const PunctualLight& light : scene.lights) {
+    f.add(light.kind);
+    f.add(light.node);
+    add(f, light.tags);
+    for (const Vec3& v : {light.position, light.direction, light.intensity}) add(f, v);
+    f.add(light.cos_inner);
+    f.add(light.cos_outer);
+  }
+  if (environment) add(f, *environment);
+  return f;
+}
+
+// --- Files -----------------------------------------------------------------------------------------------------------
+
+void CacheReader::check(std::uint64_t count, std::size_t size) const {
+  if (count > rest_.size() / size) throw Error("it is damaged");
+}
+
+void CacheReader::take(void* to, std::uint64_t count, std::size_t size) {
+  check(count, size);
+  if (count > 0) std::memcpy(to, rest_.data(), count * size);
+  rest_.remove_prefix(count * size);
+}
+
+std::string load_cache(const std::string& path, std::string_view representation, const CacheKey& key) {
+  gltf::Bytes file;
+  try {
+    gltf::MemoryBudget memory(0);
+    file = gltf::read_file(path, memory);
+  } catch (const Error& error) {
+    const std::string_view text = error.what();
+    if (text.ends_with("no such file")) throw Error("");
+    throw Error("it cannot be read");
+  }
+  const std::string_view bytes = file.text();
+  Header header;
+  if (bytes.size() < sizeof header || !bytes.starts_with(std::string_view(kMagic, sizeof kMagic))) throw Error("it is no cache");
+  std::memcpy(&header, bytes.data(), sizeof header);
+  if (header.version != kVersion) throw Error("it was written by another version of this program");
+  if (header.header != fingerprint(header)) throw Error("it is damaged");
+  if (std::string_view(header.representation) != representation) throw Error("it holds " + std::string(header.representation));
+  if (header.scene != key.scene) throw Error("it was made for another scene");
+  if (header.network != key.network) throw Error("it was made by another network, or with other parameters");
+  if (header.seed != key.seed) throw Error("it was made with seed " + std::to_string(header.seed));
+  std::string payload(bytes.substr(sizeof header));
+  Fingerprint found;
+  found.add(payload);
+  if (payload.size() != header.payload_size || found != header.payload) throw Error("it is damaged");
+  return payload;
+}
+
+void save_cache(const std::string& path, std::string_view representation, const CacheKey& key, const std::string& payload) {
+  try {
+    const Header header = make_header(representation, key, payload);
+    OutputFile file(path);
+    file.write(&header, sizeof header);
+    file.write(payload);
+    file.commit();
+  } catch (const Error& error) {
+    warning(std::string(error.what()) + ": this cache is not kept");
+  }
+}
+
+void refuse_cache(const std::string& path, std::string_view reason) {
+  if (!reason.empty()) note(printable(path) + ": this cache is not used, " + std::string(reason) + "; it is computed and written again");
+}
+
+// --- Representations -------------------------------------------------------------------------------------------------
+
+namespace {
+
+void require(bool sound) {
+  if (!sound) throw Error("it is damaged");
+}
+
+}  // namespace
+
+const char* cache_name(const Photons*) { return "Photons"; }
+
+void encode(CacheBytes& out, const Photons& photons) {
+  out.put(photons.ledger);
+  out.put(std::span<const Photon>(photons.hits));
+}
+
+void decode(CacheReader& in, PrepareContext& context, Photons& photons) {
+  photons.ledger = in.get<PhotonLedger>();
+  photons.hits = in.get_all<Photon>();
+  require(in.at_end());
+  const std::size_t triangles = context.scene().data().triangles.size();
+  for (const Photon& photon : photons.hits) require(photon.triangle < triangles);
+}
+
+const char* cache_name(const QuadTree*) { return "QuadTree"; }
+
+// Of each face the nodes of its tree, children behind parents and numbered from its root.
+void encode(CacheBytes& out, const QuadTree& tree) {
+  const std::size_t faces = tree.empty() ? 0 : tree.patches().face_count();
+  out.put(std::uint64_t{faces});
+  for (std::uint32_t face = 0; face < faces; ++face) {
+    std::vector<QuadTreeNode> nodes;
+    if (tree.lit(face)) nodes.push_back(tree.nodes()[tree.root(face)]);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      if (nodes[i].leaf()) continue;
+      const std::uint32_t children = nodes[i].children;
+      nodes[i].children = static_cast<std::uint32_t>(nodes.size());
+      for (std::uint32_t k = 0; k < 4; ++k) nodes.push_back(tree.nodes()[children + k]);
+    }
+    out.put(std::span<const QuadTreeNode>(nodes));
+  }
+}
+
+void decode(CacheReader& in, PrepareContext& context, QuadTree& tree) {
+  const auto patches = std::make_shared<const Patches>(context.scene().data());
+  tree = QuadTree(patches);
+  const auto faces = in.get<std::uint64_t>();
+  require(faces == 0 || faces == patches->face_count());
+  for (std::uint32_t face = 0; face < faces; ++face) {
+    std::vector<QuadTreeNode> nodes = in.get_all<QuadTreeNode>();
+    for (std::size_t i = 0; i < nodes.size(); ++i) require(nodes[i].leaf() || (nodes[i].children > i && nodes[i].children + 3u < nodes.size()));
+    if (!nodes.empty()) tree.set(face, std::move(nodes));
+  }
+  require(in.at_end());
+}
+
+const char* cache_name(const TriMesh*) { return "TriMesh"; }
+
+void encode(CacheBytes& out, const TriMesh& mesh) {
+  const std::size_t faces = mesh.empty() ? 0 : mesh.patches().face_count();
+  out.put(std::uint64_t{faces});
+  out.put(std::span<const Color>(mesh.vertices()));
+  for (std::uint32_t face = 0; face < faces; ++face) out.put(mesh.triangles(face));
+}
+
+void decode(CacheReader& in, PrepareContext& context, TriMesh& mesh) {
+  const auto patches = std::make_shared<const Patches>(context.scene().data());
+  mesh = TriMesh(patches);
+  const auto faces = in.get<std::uint64_t>();
+  require(faces == 0 || faces == patches->face_count());
+  const std::vector<Color> vertices = in.get_all<Color>();
+  for (const Color& vertex : vertices) mesh.add_vertex(vertex);
+  for (std::uint32_t face = 0; face < faces; ++face) {
+    const std::vector<MeshTriangle> triangles = in.get_all<MeshTriangle>();
+    for (const MeshTriangle& t : triangles)
+      for (const std::uint32_t v : t.vertex) require(v < vertices.size());
+    if (!triangles.empty()) mesh.add_triangles(face, triangles);
+  }
+  require(in.at_end());
+  mesh.finish(context.workers());
+}
+
+}  // namespace ln

@@ -76,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("file", nargs="?", metavar="FILE")
     build.add_argument("-o", dest="output", metavar="PROGRAM")
     build.add_argument("--emit-cpp", metavar="FILE", help="also write the C++ text")
-    build.add_argument("--scene", metavar="SCENE")
+    build.add_argument("--scene", metavar="SCENE", help="for this scene alone, and those that have no more")
     build.add_argument(
         "--reference", metavar="EXPR", help="make the plain reference tracer of these light paths; FILE defines tags"
     )

@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import hashlib
 import os
+import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lnc.build import BuildError, BuildOptions, build_program, program_path
 from lnc.cli import FINE, USAGE, WRONG, fail, report
@@ -24,12 +26,15 @@ from lnc.driver import (
 )
 from lnc.locations import library_folders
 
+if TYPE_CHECKING:
+    from lnc.codegen.view import SceneLetters
+
 
 def compile_command(arguments: argparse.Namespace) -> int:
     """`lnc compile FILE -o PROGRAM`."""
-    if arguments.scene is not None:
-        return fail("--scene is not supported yet")
     if arguments.reference is not None:
+        if arguments.scene is not None:
+            return fail("--scene is for networks; the reference tracer works on every scene")
         return _compile_reference(arguments)
     if arguments.file is None:
         return fail("compile needs a network: lnc compile FILE -o PROGRAM")
@@ -42,7 +47,32 @@ def compile_command(arguments: argparse.Namespace) -> int:
     result, status = _read(arguments)
     if result is None or status != FINE:
         return status
-    return _finish(write_cpp(result), arguments)
+    scene = None
+    if arguments.scene is not None:
+        try:
+            scene = _letters_of(arguments.scene, result, arguments)
+        except (BuildError, Unreadable) as error:
+            return fail(str(error))
+    return _finish(write_cpp(result, scene), arguments)
+
+
+def _letters_of(scene: str, result: Result, arguments: argparse.Namespace) -> SceneLetters:
+    """What light paths find in a scene: the network's program knows, for any scene. Raises BuildError, Unreadable."""
+    from lnc.codegen.view import SceneLetters
+
+    assert result.typed is not None
+    cpp = write_cpp(result)
+    program = program_path(Path(f"{hashlib.sha256(cpp.encode()).hexdigest()[:16]}/letters"))
+    build_program(cpp, library_folders(tuple(arguments.ops)), program, _options(arguments))
+    done = subprocess.run(
+        [str(program), scene, "--print-letters"], capture_output=True, text=True, errors="replace", check=False
+    )
+    if done.returncode != FINE:
+        reason = (done.stderr.strip().splitlines() or ["it cannot be loaded"])[-1]
+        raise Unreadable(f"--scene: {reason.removeprefix('letters: error: ')}")
+    kinds = [int(kind) for kind in done.stdout.split()]
+    count = result.typed.alphabet.combinations
+    return SceneLetters(Path(scene).name, sum(kind << (i * count) for i, kind in enumerate(kinds)))
 
 
 def _compile_reference(arguments: argparse.Namespace) -> int:
@@ -106,8 +136,8 @@ def run_command(arguments: argparse.Namespace) -> int:
     return status
 
 
-def write_cpp(result: Result) -> str:
-    """The C++ text of a network that has passed."""
+def write_cpp(result: Result, scene: SceneLetters | None = None) -> str:
+    """The C++ text of a network that has passed; for one scene only, if it is given."""
     from lnc.codegen.view import LightView, program_view
     from lnc.codegen.write import write_program
 
@@ -115,7 +145,7 @@ def write_cpp(result: Result) -> str:
     paths = describe_paths(result.typed)
     source = result.file.span.source.text
     light = LightView(
-        paths.image or "", describe_seen(result.typed), describe_conditions(result), result.typed.alphabet
+        paths.image or "", describe_seen(result.typed), describe_conditions(result), result.typed.alphabet, scene
     )
     return write_program(program_view(result.schedule, source, light))
 
@@ -139,10 +169,13 @@ def _read(arguments: argparse.Namespace) -> tuple[Result | None, int]:
 
 
 def _build(cpp: str, arguments: argparse.Namespace, output: Path) -> int:
-    options = BuildOptions(portable=getattr(arguments, "portable", False))
     try:
-        build_program(cpp, library_folders(tuple(arguments.ops)), output, options)
+        build_program(cpp, library_folders(tuple(arguments.ops)), output, _options(arguments))
     except BuildError as error:
         print(f"lnc: {error}", file=sys.stderr)
         return USAGE
     return FINE
+
+
+def _options(arguments: argparse.Namespace) -> BuildOptions:
+    return BuildOptions(portable=getattr(arguments, "portable", False))

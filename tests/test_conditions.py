@@ -9,7 +9,7 @@ import pytest
 from lnc.driver import compile_network, describe_conditions
 from lnc.library import Library
 from lnc.passes import conditions as module
-from lnc.passes.conditions import Formula, conditions, merged
+from lnc.passes.conditions import conditions, holds, merged
 from lnc.paths.automaton import Nfa
 from lnc.paths.regex import Renderer
 from lnc.source import SourceFile
@@ -51,10 +51,6 @@ def carries(nfa: Nfa, states: set[int], scene: int) -> bool:
         for target in targets:
             back[target].add(source)
     return bool(states & reached({0}, steps) & reached(nfa.accepting, back))
-
-
-def holds(formula: Formula, scene: int) -> bool:
-    return any(all(letters & scene for letters in way) for way in formula)
 
 
 @pytest.mark.parametrize("seed", range(60))

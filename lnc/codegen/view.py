@@ -13,7 +13,7 @@ from lnc.codegen.names import cpp_string, float_literal, unique_names
 from lnc.diagnostics import InternalError
 from lnc.library import POINTS, snake_case
 from lnc.network import Lightmap, ParameterValue, PathValue, Probe, Schedule, ScheduledInput, ScheduledNode, Tap, Term
-from lnc.passes.conditions import Formula
+from lnc.passes.conditions import Formula, holds
 from lnc.paths.language import EMITTERS, EVENTS, Alphabet
 from lnc.paths.regex import Renderer
 
@@ -76,6 +76,7 @@ class SkipView:
     """When a node carries no light: if a scene has all needs of none of the alternatives (bit i: needs[i])."""
 
     flag: str
+    known: bool  # that it carries none: the program is for one scene
     constant: str
     table: str
     needs: tuple[NeedView, ...]
@@ -197,7 +198,18 @@ class ProgramView:
     tags: tuple[TagRuleView, ...]
     image_paths: str
     skips: tuple[SkipView, ...]
-    path_tags: tuple[str, ...]  # numbers of the tags that `skips` tell apart
+    path_tags: tuple[str, ...]  # numbers of the tags that letters tell apart
+    compiled_for: str  # the only scene that the program is for; empty: any
+    absent: tuple[NeedView, ...]  # what that scene does not have
+    scene_events: str
+
+
+@dataclass(frozen=True)
+class SceneLetters:
+    """The letters of light paths that a scene has; `file`: its name."""
+
+    file: str
+    letters: int
 
 
 @dataclass(frozen=True)
@@ -205,13 +217,15 @@ class LightView:
     """What is known of a network's light paths.
 
     `image_paths`: those of the picture; `seen_paths`: those of each wire that has a picture of its own, as the eye sees
-    it; `conditions`: what a scene must have for operators to carry light, in letters of `alphabet`.
+    it; `conditions`: what a scene must have for operators to carry light, in letters of `alphabet`; `scene`: the only
+    one that the program is for, if so.
     """
 
     image_paths: str
     seen_paths: dict[str, str]
     conditions: dict[str, Formula]
     alphabet: Alphabet
+    scene: SceneLetters | None = None
 
 
 def program_view(schedule: Schedule, source: str, light: LightView) -> ProgramView:
@@ -223,6 +237,11 @@ class _Builder:
     def __init__(self, schedule: Schedule, light: LightView) -> None:
         self.schedule = schedule
         self.light = light
+        self.renderer = Renderer(light.alphabet)
+        self.conditions = light.conditions
+        if light.scene is not None:
+            has = light.scene.letters
+            self.conditions = {n: f for n, f in light.conditions.items() if not holds(f, has)}
         wires = [n.identifier for n in schedule.nodes]
         self.members = unique_names(wires)
         self.pulls = unique_names(wires, "pull_", self.members.values())
@@ -233,7 +252,7 @@ class _Builder:
         numbers = [str(i + 1) for i in range(len(schedule.lightmaps))]
         self.lightmaps = list(unique_names(numbers, "lightmap_", [*self.members.values()]).values())
         self.flags = unique_names(
-            [n.identifier for n in schedule.nodes if n.name in light.conditions], "skip_", self.members.values()
+            [n.identifier for n in schedule.nodes if n.name in self.conditions], "skip_", self.members.values()
         )
         self.by_name = {n.name: n for n in schedule.nodes}
         self.needed = self.upstream(schedule.wanted, through_caches=False)
@@ -267,8 +286,11 @@ class _Builder:
             slots=tuple(slot for n in self.schedule.nodes for slot in self.slots(n)),
             tags=tag_rules(self.schedule.tags),
             image_paths=self.light.image_paths,
-            skips=tuple(self.skip(self.by_name[name]) for name in self.light.conditions),
+            skips=tuple(self.skip(self.by_name[name]) for name in self.conditions),
             path_tags=tuple(str(self.tag_bits[tag]) for tag in self.light.alphabet.tags),
+            compiled_for=self.light.scene.file if self.light.scene else "",
+            absent=self.absent(),
+            scene_events=self.scene_events(),
         )
 
     def node(self, n: ScheduledNode) -> NodeView:
@@ -351,20 +373,40 @@ class _Builder:
 
     def skip(self, n: ScheduledNode) -> SkipView:
         """The condition of a node as tables; one too long for them becomes "always"."""
-        formula = self.light.conditions[n.name]
+        formula = self.conditions[n.name]
         sets = sorted({letters for way in formula for letters in way})
         if len(sets) > 64:
             sets, formula = [], ((),)
-        renderer = Renderer(self.light.alphabet)
-        count = self.light.alphabet.combinations
-        kinds = [[hex(letters >> (i * count) & (1 << count) - 1) for i in range(LETTER_KINDS)] for letters in sets]
         return SkipView(
             flag=self.flags[n.identifier],
+            known=self.light.scene is not None,
             constant=self.constants[n.identifier],
             table=f"k_{self.flags[n.identifier]}",
-            needs=tuple(NeedView(tuple(k), renderer.noun(s)) for k, s in zip(kinds, sets, strict=True)),
+            needs=tuple(map(self.need, sets)),
             alternatives=tuple(hex(sum(1 << sets.index(letters) for letters in way)) for way in formula),
         )
+
+    def need(self, letters: int) -> NeedView:
+        count = self.light.alphabet.combinations
+        kinds = tuple(hex(letters >> (i * count) & (1 << count) - 1) for i in range(LETTER_KINDS))
+        return NeedView(kinds, self.renderer.noun(letters))
+
+    def absent(self) -> tuple[NeedView, ...]:
+        """What the scene that the program is for does not have, kind by kind."""
+        if self.light.scene is None:
+            return ()
+        alphabet = self.light.alphabet
+        kinds = [alphabet.emitters(kind) for kind in EMITTERS] + [alphabet.events(event) for event in EVENTS]
+        missing = (kind & ~self.light.scene.letters for kind in kinds)
+        return tuple(self.need(letters) for letters in missing if letters)
+
+    def scene_events(self) -> str:
+        """The events of the scene that the program is for, in C++."""
+        scene = self.light.scene
+        if scene is None:
+            return "ln::Events::all"
+        found = [event for event in EVENTS if scene.letters & self.light.alphabet.events(event)]
+        return " | ".join(f"ln::Events::{event}" for event in found) or "ln::Events::none"
 
     def field(self, n: ScheduledNode, p: ParameterValue) -> str:
         """The C++ initialiser of a parameter."""

@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from itertools import combinations
 
-from lnc.library import POINTS
 from lnc.network import Network, Schedule
 from lnc.passes.path_automaton import PathAutomaton
 from lnc.paths.automaton import Nfa
@@ -38,11 +37,12 @@ NOTHING = 0  # letters of a step that needs nothing of the scene
 def light_conditions(network: Network, alphabet: Alphabet) -> dict[str, Formula]:
     """What a scene must have for each wire to carry light to some result."""
     automaton = PathAutomaton(network, alphabet, bounded=False)
-    seen = [network.image.terms] if network.image else []
-    seen += [tap.terms for tap in network.taps]
-    accepting = automaton.seen(term for terms in seen for term in terms)
-    for probe in network.probes:
-        accepting |= automaton.surfaces(probe.terms, "probe")
+    pictures = [network.image.terms] if network.image else []
+    pictures += [tap.terms for tap in network.taps]
+    accepting = automaton.seen(term for terms in pictures for term in terms)
+    for name, terms in network.results():
+        if not name.startswith(("image", "tap ")):  # nobody sees it: light only arrives
+            accepting |= automaton.surfaces(terms, name)
     silent = [[edge.target for edge in edges] for edges in automaton.graph.silent]
     states = {node.name: automaton.states_of(node.name) for node in network.nodes}
     return conditions(Nfa(automaton.graph.edges, silent, accepting), states, alphabet.eye)
@@ -79,21 +79,24 @@ def skip_conditions(plan: Schedule, formulas: Mapping[str, Formula], alphabet: A
     pull are not worth a test if a scene can lack nothing but emitters, of which there always are some, or surfaces that
     are seen.
     """
-    complete: dict[str, Formula] = {}
-    tested: set[str] = set()
     stored = {term.node for tap in plan.stored_taps for term in tap.terms}
-    readers: dict[str, list[str]] = {}  # those that read a wire whole
-    for node in reversed(plan.nodes):
-        whole = readers.get(node.name, [])
-        formula = union([formulas[node.name], *(complete[reader] for reader in whole)])
-        complete[node.name] = ALWAYS if node.name in stored else formula
-        usual = implied_by(complete[node.name], (alphabet.emitters(), alphabet.events("DG")))
-        if not usual or (node.prepares and node.name not in stored and tested.issuperset(whole)):
-            tested.add(node.name)
+    readers: dict[str, list[str]] = {node.name: [] for node in plan.nodes}  # those that read a wire whole
+    for node in plan.nodes:
         for given in node.inputs:
-            if given.port.representation != POINTS:
-                for term in given.terms:
-                    readers.setdefault(term.node, []).append(node.name)
+            for term in given.terms if not given.port.pulled else ():
+                readers[term.node].append(node.name)
+    complete = {node.name: ALWAYS if node.name in stored else formulas[node.name] for node in plan.nodes}
+    before: dict[str, Formula] = {}
+    while before != complete:  # more than twice only where cycles are read whole
+        before = dict(complete)
+        for node in reversed(plan.nodes):
+            complete[node.name] = union([complete[node.name], *(complete[reader] for reader in readers[node.name])])
+
+    usual = (alphabet.emitters(), alphabet.events("DG"))
+    rare = {name for name, formula in complete.items() if not implied_by(formula, usual)}
+    tested = rare | {node.name for node in plan.nodes if node.prepares} - stored
+    while idle := {name for name in tested - rare if not tested.issuperset(readers[name])}:
+        tested -= idle
     return {node.name: complete[node.name] for node in plan.nodes if node.name in tested}
 
 
@@ -104,6 +107,11 @@ def union(formulas: Iterable[Formula]) -> Formula:
         for way in formula:
             _add(ways, frozenset(way))
     return merged(ways)
+
+
+def holds(formula: Formula, scene: int) -> bool:
+    """Does it hold in a scene with these letters?"""
+    return any(all(letters & scene for letters in way) for way in formula)
 
 
 def implied_by(formula: Formula, sets: Iterable[int]) -> bool:

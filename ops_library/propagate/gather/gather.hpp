@@ -17,7 +17,7 @@ struct Gather {
     if (samples > 1 && !request.sample_given()) return many(request, in);
     const BsdfRay* ray = request.bsdf_ray(node);
     if (!ray || !ray->hit.found()) return Color(0);
-    return secondary_light<Via>(request.tracer(), request.random(), *ray, request.beta(), request.depth(), request.steps(), from, in);
+    return secondary_light<Via, Request::scene_events>(request.tracer(), request.random(), *ray, request.beta(), request.depth(), request.steps(), from, in);
   }
 
  private:
@@ -30,7 +30,7 @@ struct Gather {
       const SampleStream random = request.random().branch(request.depth(), j, n);
       BsdfRay ray;
       if (!request.trace_sample(random, node, ray) || !ray.hit.found()) continue;
-      sum += secondary_light<Via>(request.tracer(), random, ray, request.beta() * share, request.depth(), request.steps(), from, in);
+      sum += secondary_light<Via, Request::scene_events>(request.tracer(), random, ray, request.beta() * share, request.depth(), request.steps(), from, in);
     }
     return sum * share;
   }

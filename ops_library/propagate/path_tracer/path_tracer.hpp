@@ -17,7 +17,7 @@ struct PathTracer {
     if (request.steps() > static_cast<std::uint64_t>(max_depth - 1)) return Color(0);  // 0 wraps around: no bound
     const BsdfRay* ray = request.bsdf_ray(node);
     if (!ray || !ray->hit.found()) return Color(0);
-    return secondary_light<Via>(request.tracer(), request.random(), *ray, request.beta(), request.depth(), request.steps(), from, in);
+    return secondary_light<Via, Request::scene_events>(request.tracer(), request.random(), *ray, request.beta(), request.depth(), request.steps(), from, in);
   }
 };
 

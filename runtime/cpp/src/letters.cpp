@@ -30,6 +30,12 @@ LetterSet letters_of(const Scene& scene, std::span<const int> tags) {
   return letters;
 }
 
+std::string letters_text(const LetterSet& letters) {
+  std::string text;
+  for (const std::uint64_t kind : letters.kinds) text += (text.empty() ? "" : " ") + std::to_string(kind);
+  return text + "\n";
+}
+
 std::optional<std::string> skip_reason(const SkipRule& rule, const LetterSet& scene) {
   std::uint64_t missing = 0;
   for (std::size_t i = 0; i < rule.needs.size(); ++i)

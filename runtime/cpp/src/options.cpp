@@ -323,7 +323,7 @@ std::string replaced(std::string text, std::string_view before, std::string_view
 struct RawOptions {
   std::string scene, output, size, camera, samples, time, error, seed, threads, stats, progress, preview, environment, units, lightmap_size;
   std::vector<std::string> sets;
-  bool version = false;
+  bool version = false, print_letters = false;
 };
 
 void declare_options(CLI::App& app, RawOptions& raw) {
@@ -350,6 +350,7 @@ void declare_options(CLI::App& app, RawOptions& raw) {
   add("--units", raw.units, "UNITS", "radiometric or photometric (default: radiometric)");
   add("--lightmap-size", raw.lightmap_size, "N", "texels along each side of a lightmap's texture (default: 512)");
   app.add_flag("--version", raw.version, "print the version and exit");
+  app.add_flag("--print-letters", raw.print_letters)->group("");  // not for users: asked by `lnc compile --scene`
 }
 
 /// The long and short names of all options.
@@ -494,6 +495,7 @@ Options parse_options(int argc, const char* const* argv, const ProgramInfo& prog
   if (options.default_samples) options.samples = kDefaultSamples;
   if (!raw.seed.empty()) options.seed = parse_seed(raw.seed);
   options.threads = raw.threads.empty() ? available_processors() : static_cast<int>(parse_whole("--threads", raw.threads, 1, kMostThreads));
+  options.print_letters = raw.print_letters;
   options.stats_path = raw.stats;
   options.preview_path = raw.preview;
   require_suffix("--preview", raw.preview, ".png");

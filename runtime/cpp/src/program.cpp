@@ -185,7 +185,7 @@ RenderOutcome render_picture(RunContext& context, RunCallbacks& callbacks, const
 }
 
 int render_program(const Options& options, const ProgramInfo& program, RunCallbacks& callbacks, Progress& progress) {
-  check_files(files_of(options, program));
+  if (!options.print_letters) check_files(files_of(options, program));
   for (const char* option : options.unused)
     note(std::string(option) + " is not used: this network has nothing for it");
 

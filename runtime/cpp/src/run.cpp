@@ -134,6 +134,10 @@ PictureSize NetworkRun::load(RunContext& context) {
     environment_ = default_sky();
     has_environment_ = true;
   }
+  if (options.print_letters) {
+    const Scene scene(std::move(data_), tags_, context.workers.count(), has_environment_ ? &environment_ : nullptr);
+    throw HelpRequest{letters_text(letters_of(scene, program_.path_tags))};
+  }
   for (const ProbeInfo& info : program_.probes) probes_.emplace_back(info);
   for (const LightmapInfo& info : program_.lightmaps) lightmaps_.emplace_back(info);
   if (!program_.uses_camera()) return {};
@@ -159,8 +163,13 @@ void NetworkRun::build(RunContext& context) {
 
 void NetworkRun::skip_dark_nodes() {
   skipped_.resize(program_.nodes.size());
-  if (program_.skip_rules.empty()) return;
+  if (program_.skip_rules.empty() && !program_.compiled_for) return;
   const LetterSet letters = letters_of(*scene_, program_.path_tags);
+  for (const LetterNeed& absent : program_.absent) {
+    if (!absent.letters.meets(letters)) continue;
+    throw Error(scene_file_ + ": has a " + absent.noun + "; this program was compiled for " + program_.compiled_for +
+                ", which has none: compile it for this scene, or without --scene");
+  }
   for (const SkipRule& rule : program_.skip_rules) {
     std::optional<std::string>& reason = skipped_[rule.node] = skip_reason(rule, letters);
     if (rule.skipped) *rule.skipped = reason.has_value();

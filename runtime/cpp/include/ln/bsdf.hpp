@@ -66,6 +66,9 @@ class Bsdf {
   /// The kinds of lobes that exist, whatever wo.
   Events events() const { return events_; }
 
+  /// Is it Lambertian, black included? So it is where the scene has no event but D.
+  bool is_lambertian() const { return kind_ == Kind::lambert || !any(events_); }
+
   /// Is there no choice between lobes, so that `sample` does not use its first number?
   bool single_lobe() const { return kind_ != Kind::layered; }
 

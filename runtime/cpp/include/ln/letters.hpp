@@ -31,6 +31,9 @@ struct LetterSet {
 /// The letters that the scene may have: never too few. `tags`: numbers of the network's tags that its paths tell apart.
 LetterSet letters_of(const Scene& scene, std::span<const int> tags);
 
+/// As a line of numbers, kind by kind.
+std::string letters_text(const LetterSet& letters);
+
 /// One of several letters that a light path needs.
 struct LetterNeed {
   LetterSet letters;

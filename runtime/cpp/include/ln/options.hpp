@@ -34,6 +34,7 @@ struct Options {
   ProgressMode progress = ProgressMode::automatic;
   Units units = Units::radiometric;
   int lightmap_side = 512;  // texels
+  bool print_letters = false;       // instead of rendering: for `lnc compile --scene`
   std::vector<const char*> unused;  // options that were given, though this network has nothing to do with them
 };
 

@@ -98,7 +98,9 @@ struct ProgramInfo {
   std::span<const LightmapInfo> lightmaps = {};
   bool has_image = true;
   std::span<const SkipRule> skip_rules = {};
-  std::span<const int> path_tags = {};  // numbers of the tags that the letters of skip_rules tell apart
+  std::span<const int> path_tags = {};  // numbers of the tags that letters tell apart
+  const char* compiled_for = nullptr;   // the only scene that the program was compiled for, and those that have no more
+  std::span<const LetterNeed> absent = {};  // what that scene does not have
 
   /// Are there camera rays?
   bool uses_camera() const { return has_image || !layers.empty(); }

@@ -17,12 +17,14 @@ struct BsdfRay {
 
 /// A request at a surface point. The receiver scatters what it gets by the events in `kReceives` towards `wo`; answers
 /// are the radiance [W/(m^2 sr)] that leaves towards `wo` because of it. `kSamples` holds the events that the shared
-/// sample may pick: more than `kReceives` where the sample serves somebody else, too (the eye follows S itself).
-template <Events kReceives, Events kSamples = kReceives>
+/// sample may pick: more than `kReceives` where the sample serves somebody else, too (the eye follows S itself). `kScene`
+/// holds the events that surfaces may have at all, where a program is compiled for one scene.
+template <Events kReceives, Events kSamples = kReceives, Events kScene = Events::all>
 class Request {
  public:
   using Answer = Color;
   static constexpr Events receives = kReceives;
+  static constexpr Events scene_events = kScene;
 
   Request(Tracer& tracer, const SampleStream& random, const Interaction& at, const Color& beta, std::uint32_t depth, RayKind kind,
           std::uint32_t steps = 0)
@@ -41,26 +43,26 @@ class Request {
   bool seen() const { return kind_ == RayKind::camera; }
 
   /// Can the receiver scatter samples, i.e. light from directions of the operator's choice?
-  bool takes_samples() const { return any(at_.bsdf().events() & kReceives & Events::DG); }
+  bool takes_samples() const { return any(bsdf().events() & kReceives & Events::DG); }
 
   /// BSDF times |cos| for light from `wi`, and the solid-angle density with which the shared sample picks that direction.
   LN_INLINE BsdfValue evaluate(const Vec3& wi) const {
     const Vec3 local = at_.frame.to_local(wi);
     if (!at_.side_agrees(wi, local.z)) return {};
     static_assert((kReceives & Events::DG) == (kSamples & Events::DG), "the shared sample picks what the receiver scatters");
-    return at_.bsdf().evaluate(at_.wo_local, local, kSamples);
+    return bsdf().evaluate(at_.wo_local, local, kSamples);
   }
 
   /// The side of the surface from which emitters matter, as a normal; zero: both sides.
   Vec3 emitter_side() const {
-    if (at_.bsdf().transmits_smoothly()) return Vec3(0);
+    if (any(kScene & Events::G) && bsdf().transmits_smoothly()) return Vec3(0);
     return at_.front ? at_.at.ng : -at_.at.ng;
   }
 
   /// Radiance that the irradiance `E` [W/m^2] becomes: diffuse reflection only.
   Color scatter_irradiance(const Color& E) const {
     if constexpr (!any(kReceives & Events::D)) return Color(0);
-    return at_.bsdf().diffuse_reflectance(at_.wo_local) * E * kInvPi;
+    return bsdf().diffuse_reflectance(at_.wo_local) * E * kInvPi;
   }
 
   /// Is the way to an emitter free?
@@ -109,10 +111,18 @@ class Request {
   }
 
  private:
+  /// The surface's BSDF, of which the compiler is told what is known of the scene.
+  LN_INLINE const Bsdf& bsdf() const {
+    const Bsdf& bsdf = at_.bsdf();
+    if constexpr (kScene == Events::D)
+      if (!bsdf.is_lambertian()) __builtin_unreachable();
+    return bsdf;
+  }
+
   template <Events kFrom>
   LN_INLINE bool draw(const SampleStream& random, BsdfRay& sample) const {
     BsdfSample s;
-    const Bsdf& bsdf = at_.bsdf();
+    const Bsdf& bsdf = this->bsdf();
     const float u_lobe = bsdf.single_lobe() ? 0 : random.get1(depth_, kBsdfLobe);
     if (!bsdf.sample(at_.wo_local, u_lobe, random.get2(depth_, kBsdfDirection), kFrom, Carried::radiance, s)) return false;
     const Vec3 wi = at_.frame.to_world(s.wi);

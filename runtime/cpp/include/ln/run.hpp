@@ -4,6 +4,7 @@
 // A Network is a struct with
 //   void prepare(PrepareStep& step)              work before the picture: step(node id, [&](PrepareContext&) { ... }) each
 //   Color image(Request&) const                  what the eye gets from a surface point; a template
+//   static constexpr Events scene_events         what surfaces may scatter by, in every scene that the program accepts
 //   static constexpr int emitters_layer          the layer that shows the emitters that are seen; -1: none does
 //   static constexpr bool shows_emitters         is what is seen of the emitters part of the picture?
 //   void write_taps(Write&& write) const         write(i, what is stored) for each TapInfo; a template
@@ -102,7 +103,8 @@ class NetworkRun : public RunCallbacks {
 
  private:
   void write_pictures(const Film& film) const;
-  /// Finds the operators that carry no light in this scene, says so, and has the network leave them out.
+  /// Finds the operators that carry no light in this scene, says so, and has the network leave them out. Throws Error if the
+  /// program was compiled for a scene that has less.
   void skip_dark_nodes();
 
   const ProgramInfo& program_;
@@ -145,11 +147,12 @@ LN_INLINE Color eye_radiance(const Network& network, Tracer& tracer, Ray ray, co
     beta *= at.transmittance;
     add_emitter(beta * scene.emitters().radiance(hit, at.wo));
 
-    Request<Events::DG, Events::all> request(tracer, random, at, beta, depth + 1, RayKind::camera);
-    if (any(at.bsdf().events() & Events::DG)) result += beta * network.image(request);
+    constexpr Events kScene = Network::scene_events;
+    Request<Events::DG & kScene, kScene, kScene> request(tracer, random, at, beta, depth + 1, RayKind::camera);
+    if (any(at.bsdf().events() & Events::DG & kScene)) result += beta * network.image(request);
 
     // Follow a specular direction, if the point's sample is one.
-    if (!any(at.bsdf().events() & Events::S)) return result;
+    if (!any(at.bsdf().events() & Events::S & kScene)) return result;
     const BsdfRay* sample = request.sample();
     if (!sample || sample->event != Events::S) return result;
     beta *= sample->weight;

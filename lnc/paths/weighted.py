@@ -153,16 +153,19 @@ def weighted_graph(graph: Graph[Mark], accepting: Iterable[int], blocks: tuple[i
     kept = sorted({s for closure in closures.values() for s in closure})
     number = {state: i for i, state in enumerate(kept)}
     rows: list[tuple[Vector, ...]] = []
+    in_blocks: dict[int, list[int]] = {}  # letters -> the blocks that they hold
     for state in kept:
         row: list[Vector] = [{} for _ in blocks]
         for letters, end in graph.edges[state]:
             if end not in useful:
                 continue
-            for i, block in enumerate(blocks):
-                if letters & block:
-                    for target, weight in closures[end].items():
-                        at = number[target]
-                        row[i][at] = row[i].get(at, 0) + weight
+            if letters not in in_blocks:
+                in_blocks[letters] = [i for i, block in enumerate(blocks) if letters & block]
+            for i in in_blocks[letters]:
+                vector = row[i]
+                for target, weight in closures[end].items():
+                    at = number[target]
+                    vector[at] = vector.get(at, 0) + weight
         rows.append(tuple({s: w for s, w in v.items() if w} for v in row))
     start = {number[s]: w for s, w in closures.get(0, {}).items()}
     return reduced(Weighted(blocks, start, tuple(rows), tuple(int(s in ends) for s in kept)))
@@ -243,10 +246,14 @@ def reduced(a: Weighted) -> Weighted:
 
 def _signature(a: Weighted, state: int, part: list[int]) -> Hashable:
     """What a state counts, as far as the present classes tell."""
-    return a.final[state], tuple(tuple(sorted(_by_class(vector, part).items())) for vector in a.rows[state])
+    vectors = [_by_class(vector, part) if vector else vector for vector in a.rows[state]]
+    return a.final[state], tuple(tuple(sorted(v.items()) if len(v) > 1 else v.items()) for v in vectors)
 
 
 def _by_class(vector: Vector, part: list[int]) -> Vector:
+    if len(vector) == 1:  # most of them
+        [(state, weight)] = vector.items()
+        return {part[state]: weight} if weight else {}
     out: Vector = {}
     for state, weight in vector.items():
         out[part[state]] = out.get(part[state], 0) + weight

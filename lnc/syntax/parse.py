@@ -13,7 +13,7 @@ from lnc.diagnostics import Related, Reporter, did_you_mean, quote
 from lnc.source import SourceFile, Span
 from lnc.syntax.ast import File
 from lnc.syntax.build import Builder
-from lnc.syntax.tables import Tables, load_tables
+from lnc.syntax.tables import Rule, Tables, load_tables
 from lnc.syntax.tokens import END, NEWLINE, Token, Tokens, defined_name, tokenise
 
 STATEMENT_WORDS = (
@@ -124,45 +124,43 @@ class _Parser:
 
     def _feed(self, kind: str, token: Token) -> bool:
         """Reduce and shift; False, with the stack spoilt, if the token does not fit."""
-        stack = self.stack
-        actions = self.tables.actions
+        states, values = self.stack.states, self.stack.values
+        actions, rules = self.tables.actions, self.tables.rules
         while True:
-            action = actions[stack.states[-1]].get(kind)
+            action = actions[states[-1]].get(kind)
             if action is None:
                 return False
             if action >= 0:
-                stack.states.append(action)
-                stack.values.append(token if kind == token.type else replace(token, type=kind))
-                stack.extents.append((token.start, token.end))
+                states.append(action)
+                values.append(token if kind == token.type else replace(token, type=kind))
+                self.stack.extents.append((token.start, token.end))
                 return True
-            self._reduce(-1 - action, token)
-            if kind == END and stack.states[-1] == self.tables.end:
+            rule = rules[-1 - action]
+            if rule.inlined and len(rule.keep) == 1:  # most rules: the value stays where it is
+                if type(values[-1]) is not list:
+                    values[-1] = [values[-1]] if rule.keep[0] else []
+                states[-1] = actions[states[-2]][rule.name]
+            else:
+                self._reduce(rule, token)
+            if kind == END and states[-1] == self.tables.end:
                 return True
 
-    def _reduce(self, number: int, token: Token) -> None:
+    def _reduce(self, rule: Rule, token: Token) -> None:
         stack = self.stack
-        rule = self.tables.rules[number]
-        count = len(rule.keep)
-        if rule.inlined and count == 1:  # most rules: the value stays where it is
-            if type(stack.values[-1]) is not list:
-                stack.values[-1] = [stack.values[-1]] if rule.keep[0] else []
-            stack.states[-1] = self.tables.actions[stack.states[-2]][rule.name]
-            return
-        if count:
-            values = stack.values[-count:]
-            extent = (stack.extents[-count][0], stack.extents[-1][1])
-            del stack.states[-count:], stack.values[-count:], stack.extents[-count:]
-        else:
-            values, extent = [], (token.start, token.start)
         children: list[Any] = []
-        for value, keep in zip(values, rule.keep, strict=True):
-            if type(value) is list:  # of an inlined rule: extended in place, or growing lists would cost squares
-                if children:
-                    children.extend(value)
-                else:
-                    children = value
-            elif keep:
-                children.append(value)
+        extent = (token.start, token.start)
+        count = len(rule.keep)
+        if count:
+            extent = (stack.extents[-count][0], stack.extents[-1][1])
+            for value, keep in zip(stack.values[-count:], rule.keep, strict=True):
+                if type(value) is list:  # of an inlined rule: extended in place, or growing lists would cost squares
+                    if children:
+                        children.extend(value)
+                    else:
+                        children = value
+                elif keep:
+                    children.append(value)
+            del stack.states[-count:], stack.values[-count:], stack.extents[-count:]
         result: Any = children
         if not rule.inlined:
             result = getattr(self.builder, rule.name)(Span(self.source, *extent), children)

@@ -15,11 +15,8 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
 import statistics
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -29,7 +26,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from benchmarks import exr
+from benchmarks import programs
 from benchmarks.exr import Image
 from benchmarks.gltf_to_mitsuba import load_scene
 from benchmarks.image_error import block_test, mean_and_variance, mean_ratio, rel_mse
@@ -73,22 +70,12 @@ def compare(job: Job, variants: Sequence[str], repeats: int) -> dict[str, Runs]:
 
 
 def _run_ours(job: Job, seed: int, runs: Runs) -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        picture, stats = Path(folder, "out.exr"), Path(folder, "stats.json")
-        command = [str(job.program), str(job.scene), "-o", str(picture), "--size", f"{job.width}x{job.height}"]
-        command += ["--samples", str(job.samples), "--seed", str(seed), "--threads", str(job.threads)]
-        before = _child_cpu()
-        subprocess.run([*command, "--stats", str(stats), "--progress", "none", *job.options], check=True)
-        runs.cpu.append(_child_cpu() - before)
-        runs.stats = json.loads(stats.read_text())
-        seconds = runs.stats["seconds"]
-        runs.seconds.append(seconds["prepare"] + seconds["render"])
-        runs.images.append(exr.read(picture))
-
-
-def _child_cpu() -> float:
-    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return usage.ru_utime + usage.ru_stime
+    options = ["--threads", str(job.threads), *job.options]
+    done = programs.run(job.program, job.scene, f"{job.width}x{job.height}", job.samples, seed, options)
+    runs.cpu.append(done.cpu)
+    runs.seconds.append(done.seconds)
+    runs.stats = done.stats
+    runs.images.append(done.image)
 
 
 def _mitsuba_renderer(job: Job, variant: str) -> Callable[[int, Runs], None]:

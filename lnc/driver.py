@@ -23,6 +23,7 @@ from lnc.passes.expand_macros import expand_macros
 from lnc.passes.insert_converters import insert_converters
 from lnc.passes.resolve import resolve
 from lnc.passes.schedule import print_schedule, schedule
+from lnc.passes.sound_part import sound_part
 from lnc.passes.typecheck import typecheck
 from lnc.source import SourceFile, Span
 from lnc.syntax import ast
@@ -99,7 +100,7 @@ def write_text(path: str, text: str) -> None:
 
 
 def compile_network(source: SourceFile, library: Library, dump: Dump | None = None, exact: bool = False) -> Result:
-    """All passes over one text; each works only if those before it found no error."""
+    """All passes over one text. After an error they go on with the part of the network that it does not reach."""
     reporter = Reporter()
     file = parse(source, reporter)
     _dump_text(dump, "parse", file)
@@ -107,30 +108,29 @@ def compile_network(source: SourceFile, library: Library, dump: Dump | None = No
     file = expanded.file
     _dump_text(dump, "expand_macros", file)
     network = resolve(file, _default_name(source.name), library, reporter, expanded.broken | file.broken)
+    typed = typecheck(sound_part(network, file, reporter), reporter)
 
-    def result(typed: TypedNetwork | None, found: dict[str, tuple[str, ...]], plan: Schedule | None) -> Result:
-        return Result(file, typed, found, plan, _with_calls(reporter.sorted(), expanded.calls))
+    def sound() -> TypedNetwork:
+        return replace(typed, network=sound_part(typed.network, file, reporter))
 
-    if reporter.failed:
-        return result(None, {}, None)
-    typed = typecheck(network, reporter)
-    if not reporter.failed:
-        typed = insert_converters(typed, library, reporter)
-        _check_inserted(typed, reporter)
-    if not reporter.failed:
-        check_cycles(typed.network, reporter)
-    if reporter.failed:
-        return result(None, {}, None)
+    typed = insert_converters(sound(), library, reporter)
+    _check_inserted(typed, reporter)
+    typed = sound()
+    check_cycles(typed.network, reporter)
+    typed = sound()
+    well_typed = not reporter.failed
     found = contents(typed.network, reporter)
     plan = None if reporter.failed else schedule(typed.network, found)
-    if plan is not None:
-        check_paths(typed, reporter, exact)
+    check_paths(sound(), reporter, exact, complete=plan is not None)
     if dump is not None and plan is not None:
         from lnc.syntax.explicit import explicit
 
         dump("insert_converters", explicit(file, typed.network))
         dump("schedule", print_schedule(plan))
-    return result(typed, found, plan)
+    diagnostics = _with_calls(reporter.sorted(), expanded.calls)
+    if not well_typed:
+        return Result(file, None, {}, None, diagnostics)
+    return Result(file, typed, found, plan, diagnostics)
 
 
 def describe_paths(typed: TypedNetwork) -> PathReport:

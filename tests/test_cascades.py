@@ -1,4 +1,8 @@
-"""One mistake, one message: networks with a single mistake each, whose effects reach far, and the one message."""
+"""One mistake, one message, and all of them in one run.
+
+WRONG holds networks with a single mistake each, whose effects reach far; SEVERAL such with mistakes that have nothing
+to do with each other.
+"""
 
 from __future__ import annotations
 
@@ -524,3 +528,66 @@ def test_one_message(name: str, library: Library) -> None:
     shown = [(d.code, d.span.line, d.message) for d in found]
     assert [d.code for d in found] == [code], shown
     assert start <= found[0].span.start <= end, shown
+
+
+SEVERAL = {
+    "a parameter, and a cycle elsewhere": """
+light = Lights()
+direct = Direct(light)
+a = Radiosity(direct, «eror» = 1%)
+b = Radiosity(«direct + c»)
+c = QuadTreeToPoints(b)
+image direct + a + b
+""",
+    "a statement that cannot be read, and a wire without a way": """
+light = Lights()
+direct = Direct(light) «*» 2
+map = ParticleTracer(light)
+image direct
+tap NNDensity(«light») -> "n.exr"
+""",
+    "names, and light that another wire lacks": """
+light = Lights()
+direct = Direct(light)
+gathered = «Gathr»(direct)
+«expect direct: L | L D»
+image direct + PathTracer(«gatherd»)
+""",
+    "a tap, and light that the picture counts twice": """
+light = Lights()
+direct = Direct(light)
+tap direct -> «"d.png"»
+expect <= L .* E
+«image direct + direct»
+""",
+    "an event that irradiance has not, and light that a sound picture counts twice": """
+light = Lights()
+direct = Direct(light)
+soft = NNDensity(ParticleTracer(light))
+seen = PathTracer(soft, via = «S»)
+tap seen -> "seen.exr"
+«image direct + direct»
+""",
+    "an annotation, a cast, a cycle and an input": """
+light = Lights()
+direct = Direct(light)
+tree: TriMesh = «PointsToQuadTree(direct)»
+map = «light as PhotonMap»
+loop = «Scale(loop, factor = 0.5)»
+lost = «Radiosity()»
+image NNDensity(map) + QuadTreeToPoints(tree) + loop + lost
+""",
+}
+
+
+@pytest.mark.parametrize("name", SEVERAL)
+def test_all_in_one_run(name: str, library: Library) -> None:
+    """Each marked place has its message, and there is no other."""
+    parts = SEVERAL[name].replace("»", "«").split("«")
+    found = compile_network(SourceFile("wrong.ln", "".join(parts)), library).diagnostics
+    starts = [len("".join(parts[:i])) for i in range(1, len(parts), 2)]
+    places = [(start, start + len(part)) for start, part in zip(starts, parts[1::2], strict=True)]
+    shown = [(d.code, d.span.line, d.message) for d in found]
+    assert len(found) == len(places), shown
+    for d, (start, end) in zip(found, places, strict=True):
+        assert start <= d.span.start <= end, shown

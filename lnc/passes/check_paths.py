@@ -43,10 +43,13 @@ ROUTE_LIMIT = 4
 SPELLING_LIMIT = 256  # words that may be counted to shorten the letters of one
 
 
-def check_paths(typed: TypedNetwork, reporter: Reporter, exact: bool = False) -> None:
-    """Report what is wrong with the light paths of each result. `exact`: decide in rationals, not in a prime field."""
+def check_paths(typed: TypedNetwork, reporter: Reporter, exact: bool = False, complete: bool = True) -> None:
+    """Report what is wrong with the light paths of each result. `exact`: decide in rationals, not in a prime field.
+
+    Unless `complete`, this is a part of a network that has other mistakes: what is merely absent is not reported.
+    """
     with suppress(SilentCycle):  # which has been reported
-        _Checker(typed, reporter, exact).run()
+        _Checker(typed, reporter, exact, complete).run()
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,8 @@ class _Target:
 
 
 class _Checker:
-    def __init__(self, typed: TypedNetwork, reporter: Reporter, exact: bool) -> None:
+    def __init__(self, typed: TypedNetwork, reporter: Reporter, exact: bool, complete: bool) -> None:
+        self.complete = complete
         self.network = typed.network
         self.reporter = reporter
         self.alphabet = typed.alphabet
@@ -94,7 +98,8 @@ class _Checker:
         ends = {s for target, _ in targets for s in target.accepting}
         for tap in network.taps:
             ends |= {s for term in tap.terms for s in automaton.wire(term.node)}
-        self._check_dead(ends)
+        if self.complete:
+            self._check_dead(ends)
         for node in network.nodes:
             if node.op.equal:
                 self._check_equal(node)
@@ -115,7 +120,7 @@ class _Checker:
         blocks = common_blocks([graph.edges, wanted.edges])
         counts = self._weighted(target.accepting, blocks)
         expected = weighted_dfa(wanted, blocks)
-        at_most = expectation.at_most if expectation else target.beside
+        at_most = expectation.at_most if expectation else target.beside or not self.complete
         if not at_most and first_difference(counts, expected, self.exact) is None:
             return
         kinds = ("often", "negative") if at_most else tuple(CODES)

@@ -204,8 +204,10 @@ class _Parser:
         token = self.tokens[at]
         if token.text in self.misnamed and at != statement_at:
             return  # the statement that makes a name of this letter has its message
-        end = max(token.end, token.start + 1)
-        span = Span(self.source, token.start, min(end, len(self.source.text)) if token.type != END else token.end)
+        end = min(max(token.end, token.start + 1), len(self.source.text))
+        span = Span(self.source, token.start, end)
+        if token.type == END and at > statement_at:  # behind the last word, not below it
+            span = Span(self.source, self.tokens[at - 1].end, self.tokens[at - 1].end)
         expected = self._expected()
         bracket = self._open_bracket(statement_at, at)
         if token.type in (NEWLINE, END) and bracket is not None:

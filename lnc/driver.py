@@ -25,6 +25,7 @@ from lnc.passes.resolve import resolve
 from lnc.passes.schedule import print_schedule, schedule
 from lnc.passes.sound_part import sound_part
 from lnc.passes.typecheck import typecheck
+from lnc.paths.weighted import CountTable
 from lnc.source import SourceFile, Span
 from lnc.syntax import ast
 from lnc.syntax.parse import parse
@@ -154,6 +155,13 @@ def describe_conditions(result: Result) -> dict[str, Formula]:
     assert result.typed is not None and result.schedule is not None
     alphabet = result.typed.alphabet
     return skip_conditions(result.schedule, light_conditions(result.typed.network, alphabet), alphabet)
+
+
+def describe_wires(typed: TypedNetwork) -> dict[str, CountTable | None]:
+    """How often the eye sees each path by a wire that brings light to surfaces."""
+    from lnc.passes.light_paths import wire_counts
+
+    return wire_counts(typed.network, typed.alphabet)
 
 
 def compile_file(path: str, ops: tuple[str, ...] = (), dump: Dump | None = None) -> Result:

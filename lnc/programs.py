@@ -21,6 +21,7 @@ from lnc.driver import (
     describe_conditions,
     describe_paths,
     describe_seen,
+    describe_wires,
     read_source,
     write_text,
 )
@@ -145,7 +146,12 @@ def write_cpp(result: Result, scene: SceneLetters | None = None) -> str:
     paths = describe_paths(result.typed)
     source = result.file.span.source.text
     light = LightView(
-        paths.image or "", describe_seen(result.typed), describe_conditions(result), result.typed.alphabet, scene
+        paths.image or "",
+        describe_seen(result.typed),
+        describe_wires(result.typed),
+        describe_conditions(result),
+        result.typed.alphabet,
+        scene,
     )
     return write_program(program_view(result.schedule, source, light))
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from lnc.diagnostics import Reporter, did_you_mean, quote
 from lnc.network import Tag
 from lnc.passes.resolve import define_tags
-from lnc.paths.automaton import Dfa, TooLarge
+from lnc.paths.automaton import Dfa, TooLarge, intersection
 from lnc.paths.language import TAG_LIMIT, Alphabet, path_dfa, tags_in
-from lnc.paths.words import shortest_common, word_text
+from lnc.paths.regex import Renderer
 from lnc.source import SourceFile
 from lnc.syntax import ast
 from lnc.syntax.parse import parse
@@ -61,13 +61,13 @@ def read_reference(text: str, network: ast.File | None, reporter: Reporter) -> R
         what = "no path fits this expression" if paths.is_empty else "not every path of this begins at L and ends at E"
         reporter.error("LN0104", path.span, what, help="a picture is made of paths such as L (D|G|S)* E")
         return None
-    lost = shortest_common(paths, _out_of_reach(alphabet))
+    lost = intersection(paths, _out_of_reach(alphabet))
     return Reference(
         text=print_path(path),
         paths=paths,
         alphabet=alphabet,
         tags=tuple(known[name] for name in used),
-        lost=None if lost is None else word_text(lost, alphabet),
+        lost=None if lost.is_empty else _word_text(lost.shortest_word(), alphabet),
     )
 
 
@@ -102,3 +102,9 @@ def _out_of_reach(alphabet: Alphabet) -> Dfa:
     path = _parse_path(OUT_OF_REACH, Reporter())
     assert path is not None
     return path_dfa(path, alphabet)
+
+
+def _word_text(word: list[int], alphabet: Alphabet) -> str:
+    """One path out of sets of letters, letters adjacent."""
+    renderer = Renderer(alphabet)
+    return "".join(renderer.letter_names(letters)[0] for letters in word)

@@ -18,7 +18,7 @@ import pytest
 from lnc.diagnostics import Witness
 from lnc.driver import compile_network
 from lnc.library import Library
-from lnc.paths.automaton import Dfa, intersection, union
+from lnc.paths.automaton import Dfa, TooLarge, intersection, union
 from lnc.paths.language import Alphabet, path_dfa
 from lnc.paths.weighted import (
     PRIMES,
@@ -27,6 +27,7 @@ from lnc.paths.weighted import (
     Weighted,
     ambiguous,
     common_blocks,
+    count_table,
     difference,
     find_faults,
     first_difference,
@@ -99,6 +100,23 @@ def test_counts_and_routes_are_those_of_all_runs(seed: int) -> None:
             assert coarse.count(in_blocks(coarse, word)) == count
         ways = runs(graph, accepting, [1 << letter for letter in word], 20_000)
         assert sum(weight for weight, _ in ways) == count
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_a_table_counts_as_its_series_do(seed: int) -> None:
+    """Signed and unsigned side by side; the counts of automata with ambiguous cycles may outgrow any table."""
+    graph, accepting = random_graph(random.Random(seed), 2 + seed % 5, negative=True)
+    series = [weighted_graph(g, accepting, SINGLE) for g in (graph, graph.unsigned())]
+    try:
+        table = count_table(series, 200)
+    except TooLarge:
+        return
+    for word in all_words(5):
+        state = 0
+        for letter in word:
+            state = table.next[state][letter] if state >= 0 else -1
+        counts = table.counts[state] if state >= 0 else (0, 0)
+        assert counts == (counted(graph, accepting, word), counted(graph.unsigned(), accepting, word))
 
 
 def _letters(block: int) -> set[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path, PurePath
@@ -10,12 +10,14 @@ from pathlib import Path, PurePath
 import lnc
 from lnc.codegen.languages import TagRuleView, tag_rules
 from lnc.codegen.names import cpp_string, float_literal, unique_names
+from lnc.codegen.wires import PathTable, WireView, wire_views
 from lnc.diagnostics import InternalError
 from lnc.library import POINTS, snake_case
 from lnc.network import Lightmap, ParameterValue, PathValue, Probe, Schedule, ScheduledInput, ScheduledNode, Tap, Term
 from lnc.passes.conditions import Formula, holds
 from lnc.paths.language import EMITTERS, EVENTS, Alphabet
 from lnc.paths.regex import Renderer
+from lnc.paths.weighted import CountTable
 
 LETTER_KINDS = len(EMITTERS) + len(EVENTS)
 
@@ -111,6 +113,8 @@ class NodeView:
     text: str
     reason: str
     file: str
+    wire: WireView | None  # what it carries to surfaces
+    carried: str  # the same as a value, for --verify-paths
 
 
 @dataclass(frozen=True)
@@ -198,10 +202,11 @@ class ProgramView:
     tags: tuple[TagRuleView, ...]
     image_paths: str
     skips: tuple[SkipView, ...]
-    path_tags: tuple[str, ...]  # numbers of the tags that letters tell apart
+    path_tags: tuple[str, ...]  # numbers of the tags that light paths tell apart
     compiled_for: str  # the only scene that the program is for; empty: any
     absent: tuple[NeedView, ...]  # what that scene does not have
     scene_events: str
+    path_tables: tuple[PathTable, ...]
 
 
 @dataclass(frozen=True)
@@ -217,12 +222,13 @@ class LightView:
     """What is known of a network's light paths.
 
     `image_paths`: those of the picture; `seen_paths`: those of each wire that has a picture of its own, as the eye sees
-    it; `conditions`: what a scene must have for operators to carry light, in letters of `alphabet`; `scene`: the only
-    one that the program is for, if so.
+    it; `counts`: how often each path is, for every wire that brings light to surfaces; `conditions`: what a scene must
+    have for operators to carry light, in letters of `alphabet`; `scene`: the only one that the program is for, if so.
     """
 
     image_paths: str
     seen_paths: dict[str, str]
+    counts: Mapping[str, CountTable | None]
     conditions: dict[str, Formula]
     alphabet: Alphabet
     scene: SceneLetters | None = None
@@ -242,6 +248,8 @@ class _Builder:
         if light.scene is not None:
             has = light.scene.letters
             self.conditions = {n: f for n, f in light.conditions.items() if not holds(f, has)}
+        dark = self.conditions if light.scene else ()
+        self.wires = wire_views(schedule, light.counts, light.alphabet, dark)
         wires = [n.identifier for n in schedule.nodes]
         self.members = unique_names(wires)
         self.pulls = unique_names(wires, "pull_", self.members.values())
@@ -291,6 +299,7 @@ class _Builder:
             compiled_for=self.light.scene.file if self.light.scene else "",
             absent=self.absent(),
             scene_events=self.scene_events(),
+            path_tables=tuple(dict.fromkeys(wire.paths for wire in self.wires.values())),
         )
 
     def node(self, n: ScheduledNode) -> NodeView:
@@ -319,7 +328,15 @@ class _Builder:
             text=n.text,
             reason=n.reason,
             file=PurePath(n.file).name,
+            wire=self.wires.get(n.name),
+            carried=self.carried(n),
         )
+
+    def carried(self, n: ScheduledNode) -> str:
+        """What a wire carries: something that answers requests, or what is stored; null where neither is known."""
+        if n.op.output == POINTS:
+            return f"ln::irradiance_of([this](auto& request) {{ return {self.pulls[n.identifier]}(request); }})"
+        return "nullptr" if n.op.pulled else self.accessor(n.name)
 
     # --- Caches -------------------------------------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ from lnc.passes.path_automaton import PathAutomaton
 from lnc.paths.automaton import Dfa, TooLarge, intersection, union
 from lnc.paths.language import ALL_LIGHT, DARK, Alphabet, path_dfa
 from lnc.paths.regex import Renderer
+from lnc.paths.weighted import CountTable, common_blocks, count_table, weighted_graph
 
 
 def light_paths(network: Network, alphabet: Alphabet) -> PathReport:
@@ -59,6 +60,26 @@ def seen_paths(network: Network, alphabet: Alphabet) -> dict[str, str]:
     }
 
 
+def wire_counts(network: Network, alphabet: Alphabet) -> dict[str, CountTable | None]:
+    """How often the eye sees each path by a wire that brings light to surfaces, with signs and without; None where its
+    automaton outgrows TABLE_LIMIT."""
+    automaton = PathAutomaton(network, alphabet)
+    counts: dict[str, CountTable | None] = {}
+    for node in network.nodes:
+        if automaton.contents_of(node.name) <= {"emission"}:
+            continue
+        ends = automaton.seen([Term(node.name, 1, node.span)])
+        blocks = common_blocks([automaton.graph.edges])
+        signed = weighted_graph(automaton.graph, ends, blocks)
+        unsigned = weighted_graph(automaton.graph.unsigned(), ends, blocks) if signed.subtracts else signed
+        try:
+            counts[node.name] = count_table([signed, unsigned], TABLE_LIMIT)
+        except TooLarge:
+            counts[node.name] = None
+    return counts
+
+
+TABLE_LIMIT = 256  # states
 TOO_MANY = "too many to print"
 
 

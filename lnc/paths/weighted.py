@@ -7,6 +7,7 @@ A `Weighted` is the same series of counts without silent edges, over blocks of l
     find_faults(a, b)        a shortest word of each kind: counted too often, not at all, negatively
     ambiguous(a)             a shortest word with two runs, by the product of the automaton with itself
     runs(graph, word)        the runs behind a count, as the marks that they pass
+    count_table(series)      a deterministic automaton that counts, for programs
 
 Sources: Schuetzenberger 1961; Tzeng 1992, "A polynomial-time algorithm for the equivalence of probabilistic automata".
 
@@ -24,7 +25,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Generic, TypeVar
 
-from lnc.paths.automaton import Dfa, letter_blocks
+from lnc.paths.automaton import Dfa, TooLarge, letter_blocks
 
 PRIMES = ((1 << 61) - 1, (1 << 61) - 31)
 FAULT_BUDGET = 4000  # vectors of counts that find_faults looks at
@@ -98,6 +99,11 @@ class Graph(Generic[Mark]):
                     seen.add(source)
                     stack.append(source)
         return seen
+
+    def unsigned(self) -> Graph[Mark]:
+        """The same with the absolute values of its weights."""
+        silent = [[Silent(s.target, abs(s.weight), s.mark) for s in row] for row in self.silent]
+        return Graph(self.edges, silent, self.sources)
 
 
 @dataclass(frozen=True)
@@ -268,6 +274,45 @@ def _merged(a: Weighted, part: list[int]) -> Weighted:
         first.setdefault(p, state)
     rows = tuple(tuple(_by_class(v, part) for v in a.rows[state]) for state in first.values())
     return Weighted(a.blocks, _by_class(a.start, part), rows, tuple(a.final[s] for s in first.values()))
+
+
+# --- Tables -----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class CountTable:
+    """Several series as one deterministic automaton: `next[state][block]`, -1 where nothing is counted any more, and
+    what each series counts at a state."""
+
+    blocks: tuple[int, ...]
+    next: tuple[tuple[int, ...], ...]
+    counts: tuple[tuple[int, ...], ...]
+
+
+def count_table(series: Sequence[Weighted], limit: int) -> CountTable:
+    """States are what the series have counted so far. All have the same blocks. Raises TooLarge."""
+    queue: list[tuple[Vector, ...]] = []
+    index: dict[Hashable, int] = {}
+
+    def number(vectors: tuple[Vector, ...]) -> int:
+        if not any(vectors):
+            return -1
+        key = tuple(frozenset(vector.items()) for vector in vectors)
+        if key not in index:
+            if len(index) >= limit:
+                raise TooLarge
+            index[key] = len(queue)
+            queue.append(vectors)
+        return index[key]
+
+    number(tuple(a.start for a in series))
+    blocks = series[0].blocks
+    rows: list[tuple[int, ...]] = []
+    for vectors in queue:
+        steps = (tuple(a.step(v, i) for a, v in zip(series, vectors, strict=True)) for i in range(len(blocks)))
+        rows.append(tuple(map(number, steps)))
+    counts = tuple(tuple(a.value(v) for a, v in zip(series, vectors, strict=True)) for vectors in queue)
+    return CountTable(blocks, tuple(rows) or ((-1,) * len(blocks),), counts or ((0,) * len(series),))
 
 
 # --- Equality ---------------------------------------------------------------------------------------------------------

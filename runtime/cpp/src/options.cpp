@@ -323,7 +323,7 @@ std::string replaced(std::string text, std::string_view before, std::string_view
 struct RawOptions {
   std::string scene, output, size, camera, samples, time, error, seed, threads, stats, progress, preview, environment, units, lightmap_size;
   std::vector<std::string> sets;
-  bool version = false, print_letters = false;
+  bool version = false, print_letters = false, verify_paths = false;
 };
 
 void declare_options(CLI::App& app, RawOptions& raw) {
@@ -349,6 +349,8 @@ void declare_options(CLI::App& app, RawOptions& raw) {
   add("--env", raw.environment, "FILE.hdr", "environment map that lights the scene");
   add("--units", raw.units, "UNITS", "radiometric or photometric (default: radiometric)");
   add("--lightmap-size", raw.lightmap_size, "N", "texels along each side of a lightmap's texture (default: 512)");
+  app.add_flag("--verify-paths", raw.verify_paths,
+               "no picture: compare the energy on every wire with its light paths; exit status 1 if one deviates (--samples: points a batch)");
   app.add_flag("--version", raw.version, "print the version and exit");
   app.add_flag("--print-letters", raw.print_letters)->group("");  // not for users: asked by `lnc compile --scene`
 }
@@ -515,6 +517,8 @@ Options parse_options(int argc, const char* const* argv, const ProgramInfo& prog
   unused("--size", raw.size, program.uses_camera());
   unused("--camera", raw.camera, program.uses_camera());
   unused("--lightmap-size", raw.lightmap_size, !program.lightmaps.empty());
+  options.verify_paths = raw.verify_paths;
+  if (options.verify_paths && (options.time || options.error)) throw UsageError("--verify-paths is limited by --samples only");
   options.sets = raw.sets;
   for (const std::string& text : raw.sets) apply_set(text, program);
   return options;

@@ -185,7 +185,7 @@ RenderOutcome render_picture(RunContext& context, RunCallbacks& callbacks, const
 }
 
 int render_program(const Options& options, const ProgramInfo& program, RunCallbacks& callbacks, Progress& progress) {
-  if (!options.print_letters) check_files(files_of(options, program));
+  if (!options.print_letters && !options.verify_paths) check_files(files_of(options, program));
   for (const char* option : options.unused)
     note(std::string(option) + " is not used: this network has nothing for it");
 
@@ -207,6 +207,8 @@ int render_program(const Options& options, const ProgramInfo& program, RunCallba
   callbacks.build(context);
   stats.seconds.build = watch.seconds();
   throw_if_interrupted();
+
+  if (options.verify_paths) return callbacks.verify(context) ? 0 : kFailed;
 
   std::optional<Film> film;
   if (program.uses_camera()) {

@@ -57,7 +57,7 @@ class ReferencePaths {
   ReferencePaths(const Scene& scene, const PathLanguage& language) : scene_(scene), language_(language), emitters_(scene, language) {
     has_specular_beginnings_ =
         letters_of(scene, {}).kinds[LetterSet::specular] != 0 &&
-        std::any_of(emitters_.all().begin(), emitters_.all().end(), [](const EmitterClass& c) { return c.delta; });
+        std::any_of(emitters_.all().begin(), emitters_.all().end(), [&](const EmitterClass& c) { return c.delta && language.after(0, c.letter) >= 0; });
   }
 
   /// Are there paths L@delta S ...?
@@ -132,7 +132,10 @@ class ReferencePaths {
   static constexpr EventChoice kAllEvents = {true, true, true}, kSpecularOnly = {false, false, true};
 
   /// Does a path that begins with an emitter of this class fit to `rest`?
-  static bool begins(const EmitterClass& source, const States& rest) { return rest[static_cast<std::size_t>(source.state)]; }
+  bool begins(const EmitterClass& source, const States& rest) const {
+    const int state = language_.after(0, source.letter);
+    return state >= 0 && rest[static_cast<std::size_t>(state)];
+  }
 
   Color environment(const States& rest, const Vec3& direction, const std::optional<Departure>& departure) const {
     const EmitterClass* source = emitters_.of_environment();
@@ -153,6 +156,7 @@ class ReferencePaths {
                       Random& random) const {
     Color result(0);
     for (const EmitterClass& source : emitters_.all()) {
+      if (language_.after(0, source.letter) < 0) continue;
       const float pick = random.get1();
       const LightSample light = source.emitters->sample(at.at, emitter_side(at), pick, random.get2());
       if (!(light.pdf_w > 0) || is_black(light.radiance)) continue;

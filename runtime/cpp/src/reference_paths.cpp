@@ -5,20 +5,20 @@
 
 namespace ln {
 
-EmitterClasses::EmitterClasses(const Scene& scene, const PathLanguage& language) {
+EmitterClasses::EmitterClasses(const Scene& scene, const PathLanguage& letters) {
   const SceneData& data = scene.data();
-  std::map<int, int> found;  // letter -> class; -1: no light, or no word begins so
+  std::map<int, int> found;  // letter -> class; -1: no light
   const auto class_of = [&](bool delta, TagSet tags) {
-    const int letter = language.emitter(delta, tags), state = language.after(0, letter);
+    const int letter = letters.emitter(delta, tags);
     const auto [entry, is_new] = found.try_emplace(letter, -1);
-    if (!is_new || state < 0) return entry->second;
+    if (!is_new) return entry->second;
     EmitterSelection selection;
-    for (std::uint32_t i = 0; i < data.parts.size(); ++i) selection.parts.push_back(letter == language.emitter(false, scene.part_tags(i)));
-    for (std::size_t i = 0; i < data.lights.size(); ++i) selection.lights.push_back(letter == language.emitter(true, scene.light_tags(i)));
-    std::unique_ptr<Emitters> emitters = scene.selected_emitters(selection, letter == language.emitter(false, 0));
+    for (std::uint32_t i = 0; i < data.parts.size(); ++i) selection.parts.push_back(letter == letters.emitter(false, scene.part_tags(i)));
+    for (std::size_t i = 0; i < data.lights.size(); ++i) selection.lights.push_back(letter == letters.emitter(true, scene.light_tags(i)));
+    std::unique_ptr<Emitters> emitters = scene.selected_emitters(selection, letter == letters.emitter(false, 0));
     if (emitters->empty()) return -1;
     entry->second = static_cast<int>(classes_.size());
-    classes_.push_back({delta, state, std::move(emitters)});
+    classes_.push_back({delta, letter, std::move(emitters)});
     return entry->second;
   };
   for (std::uint32_t i = 0; i < data.parts.size(); ++i) parts_.push_back(class_of(false, scene.part_tags(i)));

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <glm/common.hpp>
 #include <numeric>
 
@@ -154,14 +155,14 @@ void NetworkRun::build(RunContext& context) {
     const bool first = i == 0 || tags_[i - 1].tag != tag;
     if (first && scene_->tag_matches(tag) == 0) warning("LN0501: tag " + std::string(tags_[i].name) + " matches nothing in this scene");
   }
-  skip_dark_nodes();
+  skip_dark_nodes(context.options.verify_paths);
   seed_hash_ = hash32(static_cast<std::uint32_t>(context.options.seed), static_cast<std::uint32_t>(context.options.seed >> 32));
   prepare_context_.emplace(*scene_, context.workers, context.options.seed, program_.nodes.size(), View{camera_, size_.width, size_.height});
   prepare_seconds_.assign(program_.nodes.size(), 0);
   for (int i = 0; i < context.workers.count(); ++i) tracers_.emplace_back(*scene_, program_.nodes.size(), program_.layers.size());
 }
 
-void NetworkRun::skip_dark_nodes() {
+void NetworkRun::skip_dark_nodes(bool verifies) {
   skipped_.resize(program_.nodes.size());
   if (program_.skip_rules.empty() && !program_.compiled_for) return;
   const LetterSet letters = letters_of(*scene_, program_.path_tags);
@@ -170,6 +171,7 @@ void NetworkRun::skip_dark_nodes() {
     throw Error(scene_file_ + ": has a " + absent.noun + "; this program was compiled for " + program_.compiled_for +
                 ", which has none: compile it for this scene, or without --scene");
   }
+  if (verifies) return;  // also light that reaches no result
   for (const SkipRule& rule : program_.skip_rules) {
     std::optional<std::string>& reason = skipped_[rule.node] = skip_reason(rule, letters);
     if (rule.skipped) *rule.skipped = reason.has_value();
@@ -209,6 +211,27 @@ RenderOutcome NetworkRun::measure(RunContext& context, const RenderLimits& limit
     all.seconds = seconds;
   }
   return all;
+}
+
+bool NetworkRun::verify(RunContext& context) {
+  const Options& options = context.options;
+  Verification verification(*scene_, program_, tags_, options.default_samples ? Verification::kDefaultSamples : *options.samples);
+  for (std::uint32_t batch = 0; batch < Verification::kBatches; ++batch) {
+    PrepareContext prepare(*scene_, context.workers, options.seed * Verification::kBatches + batch, program_.nodes.size(),
+                           View{camera_, size_.width, size_.height});
+    PrepareStep step(prepare, context, prepare_seconds_, nullptr, false);
+    prepare_network(step);
+    context.progress.phase("verify");
+    verification.begin_batch(prepare);
+    measure_wires(verification);
+    verification.end_batch();
+  }
+  const VerificationReport report = verification.report();
+  context.progress.finish(report.deviating_wires == 0 ? "every wire carries the light of its paths"
+                                                      : std::to_string(report.deviating_wires) + " wires deviate from their light paths");
+  std::fputs(report.table.c_str(), stdout);
+  if (std::fflush(stdout) != 0) throw Error("the table cannot be written");
+  return report.deviating_wires == 0;
 }
 
 void NetworkRun::finish(RunContext&, const Film* film) {

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -148,12 +149,13 @@ class CachedWire {
   /// Must the wire be computed?
   bool wanted() const { return !found_; }
 
-  /// Keeps what has been computed, which must outlive this.
+  /// Keeps what has been computed, which must outlive this; in the file, too, if that was to be opened.
   void keep(const T& computed, const std::string& path) {
     wire_ = &computed;
+    if (!key_) return;
     CacheBytes out;
     encode(out, computed);
-    save_cache(path, cache_name(&computed), key_, out.bytes());
+    save_cache(path, cache_name(&computed), *key_, out.bytes());
   }
 
   /// The wire; empty before either, as in a scene where it carries no light.
@@ -163,7 +165,7 @@ class CachedWire {
   }
 
  private:
-  CacheKey key_;
+  std::optional<CacheKey> key_;
   std::unique_ptr<T> found_;
   const T* wire_ = nullptr;
 };

@@ -31,6 +31,7 @@ struct Options {
   int threads = 1;  // parse_options: all processors that this process may use
   std::vector<std::string> sets;  // "node.parameter=value" as given; the slots hold the values already
   std::string stats_path, preview_path, environment_path;  // empty: none
+  bool verify_paths = false;      // no picture: compare the wires with their light paths
   ProgressMode progress = ProgressMode::automatic;
   Units units = Units::radiometric;
   int lightmap_side = 512;  // texels

@@ -128,6 +128,9 @@ class RunCallbacks {
   virtual void prepare(RunContext& context) = 0;
   /// Results other than pictures, each written when it is done, within `limits`. Returns how far they came.
   virtual RenderOutcome measure(RunContext&, const RenderLimits&) { return {}; }
+  /// Instead of preparing and rendering (--verify-paths): compares every wire with its light paths and prints what was found.
+  /// Returns whether all is well.
+  virtual bool verify(RunContext&) { throw UsageError("--verify-paths: this program has no wires"); }
   /// Adds samples [tile.first_sample, tile.first_sample + tile.sample_count) of the tile's pixels to the film; called from
   /// many threads. What it adds must depend on pixel and sample number only, never on tile, worker or order. It returns early,
   /// between two samples of a pixel, when tile.stopped().

@@ -19,17 +19,17 @@ inline constexpr int kSpecular = 2;
 /// The emitters that one letter stands for.
 struct EmitterClass {
   bool delta;
-  int state;  // of the language, after the letter
+  int letter;
   std::unique_ptr<Emitters> emitters;
 };
 
-/// All emitters with which a word of the language may begin, by letter.
+/// All emitters of a scene, by the letters of a language.
 class EmitterClasses {
  public:
-  EmitterClasses(const Scene& scene, const PathLanguage& language);
+  EmitterClasses(const Scene& scene, const PathLanguage& letters);
 
   const std::vector<EmitterClass>& all() const { return classes_; }
-  /// The emitters of a part's letter, and of the environment's; null: there are none, or no word begins there.
+  /// The emitters of a part's letter, and of the environment's; null: there are none.
   const EmitterClass* of_part(std::uint32_t part) const { return at(parts_[part]); }
   const EmitterClass* of_environment() const { return at(environment_); }
 
@@ -66,46 +66,28 @@ Color scattered(const Interaction& at, const Vec3& w, int event, Carried carried
 float arrival_factor(const Interaction& at);
 float departure_factor(const Interaction& at, const Vec3& w);
 
-/// A particle at a surface.
-struct Arrival {
-  const Interaction& at;
-  const Ray& ray;   // that led here
-  Color flux;       // that arrives [W / unit^2]
-  int state;        // of the language so far
-  int last_event;   // -1: straight from the emitter
-};
-
-/// Traces one particle of `source`. `visit(arrival)` is called at each surface and returns the events by which the particle may
-/// go on.
-template <class Visit>
-void trace_particle(Tracer& tracer, NodeId node, const PathLanguage& language, const EmitterClass& source, Random& random, Visit&& visit) {
-  const Scene& scene = tracer.scene();
+/// Traces one particle. `arrive(at, ray, flux)` is told where it is and the flux that arrives [W / unit^2], and returns the events
+/// by which it may go on; `leave(at, event)` is told which it took.
+template <class Arrive, class Leave>
+void trace_particle(Tracer& tracer, NodeId node, const Emitters& emitters, Random& random, Arrive&& arrive, Leave&& leave) {
   const float pick = random.get1();
   const Vec2 position = random.get2();
-  const PhotonEmission start = source.emitters->emit(pick, position, random.get2());
+  const PhotonEmission start = emitters.emit(pick, position, random.get2());
   const float full = max_component(start.flux);
   if (!(full > 0)) return;
 
   Color flux = start.flux;
   Ray ray = spawn_ray(start.position, start.direction);
-  int state = source.state, last_event = -1;
   for (std::uint32_t depth = 1;; ++depth) {
     const Hit hit = tracer.intersect(ray, random.bits(), node, RayKind::photon);
     if (!hit.found()) return;
-    const Interaction at(scene, ray, hit);
+    const Interaction at(tracer.scene(), ray, hit);
     flux *= at.transmittance;
-    EventChoice allowed = visit(Arrival{at, ray, flux, state, last_event});
-
-    int next[kEventCount];
-    for (int e = 0; e < kEventCount; ++e) {
-      next[e] = language.after(state, language.event(e, scene.part_tags(at.part)));
-      allowed[e] = allowed[e] && next[e] >= 0;
-    }
+    const EventChoice allowed = arrive(at, ray, flux);
     const Scattering s = scatter(at, event_probabilities(at, allowed), Carried::flux, random);
     if (s.event < 0) return;
+    leave(at, s.event);
     flux *= s.weight * arrival_factor(at) * departure_factor(at, s.direction);
-    state = next[s.event];
-    last_event = s.event;
     ray = spawn_ray(at.at, s.direction);
 
     constexpr std::uint32_t kRouletteFrom = 3;
@@ -114,6 +96,34 @@ void trace_particle(Tracer& tracer, NodeId node, const PathLanguage& language, c
     if (random.get1() >= survival) return;
     flux /= survival;
   }
+}
+
+/// A particle at a surface, on a path of a language.
+struct Arrival {
+  const Interaction& at;
+  const Ray& ray;   // that led here
+  Color flux;       // that arrives [W / unit^2]
+  int state;        // of the language so far
+  int last_event;   // -1: straight from the emitter
+};
+
+/// The same for the paths of a language alone; `visit(arrival)` returns the events that it wants to go on by.
+template <class Visit>
+void trace_particle(Tracer& tracer, NodeId node, const PathLanguage& language, const EmitterClass& source, Random& random, Visit&& visit) {
+  int state = language.after(0, source.letter), last_event = -1;
+  if (state < 0) return;
+  const auto next = [&](const Interaction& at, int event) { return language.after(state, language.event(event, tracer.scene().part_tags(at.part))); };
+  trace_particle(
+      tracer, node, *source.emitters, random,
+      [&](const Interaction& at, const Ray& ray, const Color& flux) {
+        EventChoice allowed = visit(Arrival{at, ray, flux, state, last_event});
+        for (int e = 0; e < kEventCount; ++e) allowed[e] = allowed[e] && next(at, e) >= 0;
+        return allowed;
+      },
+      [&](const Interaction& at, int event) {
+        state = next(at, event);
+        last_event = event;
+      });
 }
 
 }  // namespace ln

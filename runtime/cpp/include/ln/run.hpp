@@ -9,6 +9,7 @@
 //   static constexpr bool shows_emitters         is what is seen of the emitters part of the picture?
 //   void write_taps(Write&& write) const         write(i, what is stored) for each TapInfo; a template
 //   auto measured() const                        what evaluates the wires of all probes, then of all lightmaps: a tuple
+//   void wires(Visit&&) const                    visit(WireInfo, what the wire carries) for each wire but emission (verify.hpp)
 
 #include <atomic>
 #include <memory>
@@ -28,6 +29,7 @@
 #include "ln/render_passes.hpp"
 #include "ln/request.hpp"
 #include "ln/tap.hpp"
+#include "ln/verify.hpp"
 
 namespace ln {
 
@@ -37,14 +39,15 @@ inline constexpr NodeId kEye = 0;
 /// Runs and times the preparation of one node after the other.
 class PrepareStep {
  public:
-  PrepareStep(PrepareContext& context, RunContext& run, std::vector<double>& seconds, const Image* environment)
-      : context_(context), run_(run), seconds_(seconds), environment_(environment) {}
+  /// `environment`: what lights the scene from outside, or null. `caches`: may files from earlier runs be used and written?
+  PrepareStep(PrepareContext& context, RunContext& run, std::vector<double>& seconds, const Image* environment, bool caches = true)
+      : context_(context), run_(run), seconds_(seconds), environment_(environment), caches_(caches) {}
 
   /// Lets a cache look whether it has its wire from an earlier run. `network` stands for the part of the network that leads to it;
   /// the parameters of its `nodes` count as they are now.
   template <class Cache>
   void open(Cache& cache, const char* network, std::initializer_list<const char*> nodes) {
-    cache.open(context_, cache_key(network, nodes));
+    if (caches_) cache.open(context_, cache_key(network, nodes));
   }
 
   void operator()(NodeId node, FunctionRef<void(PrepareContext&)> work);
@@ -56,6 +59,7 @@ class PrepareStep {
   RunContext& run_;
   std::vector<double>& seconds_;
   const Image* environment_;
+  bool caches_;
   std::optional<Fingerprint> scene_;
 };
 
@@ -83,6 +87,7 @@ class NetworkRun : public RunCallbacks {
   void build(RunContext& context) override;
   void prepare(RunContext& context) override;
   RenderOutcome measure(RunContext& context, const RenderLimits& limits) override;
+  bool verify(RunContext& context) override;
   void finish(RunContext& context, const Film* film) override;
   void collect(Stats& stats) override;
 
@@ -91,6 +96,8 @@ class NetworkRun : public RunCallbacks {
   virtual void write_taps() {}
   /// Samples of probe `number`, or of lightmap `number` less the number of probes.
   virtual void measure_tile(std::size_t /*number*/, const Tile&, Film&) {}
+  /// After prepare_network: every wire.
+  virtual void measure_wires(Verification&) { throw UsageError("--verify-paths: this program has no wires"); }
 
   const Scene& scene() const { return *scene_; }
   const CameraRays& camera() const { return camera_; }
@@ -104,8 +111,8 @@ class NetworkRun : public RunCallbacks {
  private:
   void write_pictures(const Film& film) const;
   /// Finds the operators that carry no light in this scene, says so, and has the network leave them out. Throws Error if the
-  /// program was compiled for a scene that has less.
-  void skip_dark_nodes();
+  /// program was compiled for a scene that has less. Where it `verifies`, nothing is left out.
+  void skip_dark_nodes(bool verifies);
 
   const ProgramInfo& program_;
   std::span<const TagRule> tags_;
@@ -201,6 +208,10 @@ class NetworkProgram final : public NetworkRun {
       else this->lightmaps()[number - probes].measure(tile, tracer, seed_hash(), wire, film);
     };
     std::apply([&](const auto&... wire) { (measure(wire), ...); }, network_.measured());
+  }
+
+  void measure_wires(Verification& verification) override {
+    network_.wires([&](const WireInfo& wire, const auto& carried) { verification.measure(wire, carried); });
   }
 
  private:

@@ -150,17 +150,29 @@ def table(rows: dict[str, Row]) -> str:
 
 
 def sheet(pictures: Sequence[tuple[Image, Image]]) -> NDArray[np.uint8]:
-    """Pictures, given with their references, in the upper row, their differences from these in the lower.
+    """Pictures, given with their references, in the upper row; below each its difference, in blocks of 4 x 4 pixels.
 
     Red is too bright, blue too dark, full colour at 10 % of the reference plus 1 % of its mean.
     """
     upper = [exr.tone_mapped(image) for image, _ in pictures]
     lower = []
     for image, truth in pictures:
-        relative = ((image - truth) / (np.abs(truth) + 0.1 * truth.mean())).mean(axis=-1) / 0.1
+        mine, right = _blocks(image), _blocks(truth)
+        relative = (mine - right) / (0.1 * right + 0.01 * truth.mean())
         red, blue = np.clip(relative, 0, 1), np.clip(-relative, 0, 1)
-        lower.append(np.round(255 * np.stack([1 - blue, 1 - red - blue, 1 - red], axis=-1).clip(0, 1)).astype(np.uint8))
+        colours = np.round(255 * np.stack([1 - blue, 1 - red - blue, 1 - red], axis=-1)).astype(np.uint8)
+        lower.append(
+            np.pad(colours, ((0, image.shape[0] - len(colours)), (0, image.shape[1] - colours.shape[1]), (0, 0)))
+        )
     return np.concatenate([np.concatenate(upper, axis=1), np.concatenate(lower, axis=1)])
+
+
+def _blocks(image: Image, size: int = 4) -> Image:
+    """Each pixel's block mean of all channels; what is left at the right and lower edge goes."""
+    rows, columns = image.shape[0] // size, image.shape[1] // size
+    means = image[: rows * size, : columns * size].reshape(rows, size, columns, size * image.shape[2]).mean(axis=(1, 3))
+    whole: Image = means.repeat(size, axis=0).repeat(size, axis=1)
+    return whole
 
 
 def main() -> None:
@@ -206,8 +218,8 @@ default settings, with the reference tracer of its own light paths (`lnc compile
 pixel. All at {size}, {samples} samples a pixel, two threads. `bias` is the mean of the picture against the reference;
 `reference` is how long the reference tracer takes to the same relMSE. `python -m benchmarks.agreement` makes this page.
 
-Below each table: the pictures in the order of the rows, and under each its difference from the reference, red where it
-is too bright, blue where it is too dark, full colour at 10 %."""
+Below each table: the pictures in the order of the rows, and under each its difference from the reference in blocks of
+4 x 4 pixels, red where it is too bright, blue where it is too dark, full colour at 10 %."""
 
 
 if __name__ == "__main__":

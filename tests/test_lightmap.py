@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import sys
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks import exr
+from lnc.driver import compile_network
+from lnc.source import SourceFile
 
 SCENES = Path(__file__).resolve().parents[1] / "examples" / "scenes"
 sys.path.insert(0, str(SCENES))
@@ -20,6 +23,19 @@ network baked
 direct   = Direct(Lights())
 expect   <= L
 lightmap direct -> "floor.glb"
+"""
+MIRRORED = """
+network mirrored
+expect   <= L@area S
+lightmap PathTracer(Direct(Lights()), via = S) -> "mirrored.glb"
+"""
+TWICE = """
+network twice
+direct = Direct(Lights())
+again  = Direct(Lights())
+expect   <= L
+lightmap direct
+       + again -> "floor.glb"
 """
 SHOW = """
 network shown
@@ -90,6 +106,41 @@ def test_texels(compiled_network, run_program, tmp_path):
     first = [(tmp_path / name).read_bytes() for name in ("floor.glb", "floor.exr")]
     run_program(program, scene, *options, "--threads", "1")
     assert first == [(tmp_path / name).read_bytes() for name in ("floor.glb", "floor.exr")]
+
+
+def test_light_that_no_eye_sees(compiled_network, run_program, tmp_path):
+    """A mirror lights its lamp: a picture of nothing but these two has no path L S D E, the lightmap has L S."""
+    program = compiled_network("mirrored", text=MIRRORED)
+    diffuse = SCENES / "plane_area.gltf"
+    run = run_program(program, diffuse, "--samples", "4", "--lightmap-size", "64")
+    (tracer,) = (node for node in run.stats["nodes"] if node["op"] == "PathTracer")
+    assert (tracer["skipped"], tracer["rays"]) == ("the scene has no specular surface", 0)
+    assert exr.read(tmp_path / "mirrored.exr").max() == 0
+
+    model = json.loads(diffuse.read_text())
+    for material in model["materials"]:
+        if "emissiveFactor" not in material:
+            material["pbrMetallicRoughness"] = {"metallicFactor": 1, "roughnessFactor": 0}
+            del material["extensions"]
+    shutil.copy(SCENES / "plane_area.bin", tmp_path)
+    mirror = tmp_path / "mirror.gltf"
+    mirror.write_text(json.dumps(model))
+    run = run_program(program, mirror, "--samples", "64", "--lightmap-size", "64")
+    assert run.status == 0, run.stderr
+    (tracer,) = (node for node in run.stats["nodes"] if node["op"] == "PathTracer")
+    assert tracer["skipped"] is None and tracer["rays"] > 0
+    assert exr.read(tmp_path / "mirrored.exr").max() > 0
+
+
+def test_light_counted_twice_is_found_where_it_is_written(library):
+    (found,) = compile_network(SourceFile("twice.ln", TWICE), library).diagnostics
+    assert (found.code, found.message) == ("LN0301", "L is counted 2 times on 'lightmap'")
+    assert str(found.span) == "twice.ln:6:1"
+    routes = [[f"{hop.wire} {hop.span}" for hop in route] for route in found.witness.routes]
+    assert routes == [
+        ["direct twice.ln:3:17", "lightmap twice.ln:6:10"],
+        ["again twice.ln:4:17", "lightmap twice.ln:7:10"],
+    ]
 
 
 def test_our_programs_show_it(compiled_network, run_program, tmp_path):

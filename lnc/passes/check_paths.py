@@ -331,9 +331,8 @@ class _Checker:
 
     def _result_wires(self) -> set[str]:
         network = self.network
-        terms = [t for tap in network.taps for t in tap.terms] + [t for p in network.probes for t in p.terms]
-        terms += network.image.terms if network.image else ()
-        return {t.node for t in terms} | {e.wire for e in network.expectations if e.wire is not None}
+        shown = {t.node for _, terms in network.results() for t in terms}
+        return shown | {e.wire for e in network.expectations if e.wire is not None}
 
     def _check_equal(self, node: Node) -> None:
         """LN0307 where the ports of an operator must carry equal light paths and do not."""

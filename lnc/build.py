@@ -50,7 +50,7 @@ def build_program(
     _refuse_bad_output(output)
     runtime = build_runtime(options, quiet)
     folders = tuple(include_folders)
-    key = _digest([runtime.key, cpp, *(_tree_digest(folder, (".hpp",)) for folder in folders)])
+    key = digest([runtime.key, cpp, *(_tree_digest(folder, (".hpp",)) for folder in folders)])
     programs = _writable_cache() / "programs"
     programs.mkdir(parents=True, exist_ok=True)
     program = programs / key
@@ -76,9 +76,8 @@ def build_runtime(options: BuildOptions, quiet: bool = False) -> Runtime:
     root = data_root()
     compiler = os.environ.get("CXX", "c++")
     machine = [_compiler_identity(compiler), "portable" if options.portable else _processor()]
-    folder = _writable_cache() / "runtime" / _digest([str(root), *machine])[:16]
-    sources = _tree_digest(root / "runtime" / "cpp", (".cpp", ".hpp", ".S"))
-    key = _digest([sources, (root / "CMakeLists.txt").read_text(), *machine])
+    folder = _writable_cache() / "runtime" / digest([str(root), *machine])[:16]
+    key = digest([runtime_sources(), (root / "CMakeLists.txt").read_text(), *machine])
     done = folder / "built"
     if _text_of(done) != key:
         folder.mkdir(parents=True, exist_ok=True)
@@ -94,6 +93,20 @@ def build_runtime(options: BuildOptions, quiet: bool = False) -> Runtime:
                 _cmake(root, folder, options)
                 done.write_text(key)
     return _read_flags(key, folder)
+
+
+def runtime_sources() -> str:
+    """Changes with the sources of the runtime library."""
+    return _tree_digest(data_root() / "runtime" / "cpp", (".cpp", ".hpp", ".S"))
+
+
+def digest(parts: Iterable[str]) -> str:
+    """Tells sequences of texts apart."""
+    found = hashlib.sha256()
+    for part in parts:
+        data = part.encode("utf-8", "surrogateescape")
+        found.update(len(data).to_bytes(8, "little") + data)
+    return found.hexdigest()[:32]
 
 
 def _text_of(file: Path) -> str | None:
@@ -205,17 +218,9 @@ def _lock(path: Path, shared: bool = False) -> Iterator[None]:
         yield
 
 
-def _digest(parts: Iterable[str]) -> str:
-    digest = hashlib.sha256()
-    for part in parts:
-        data = part.encode("utf-8", "surrogateescape")
-        digest.update(len(data).to_bytes(8, "little") + data)
-    return digest.hexdigest()[:32]
-
-
 def _tree_digest(folder: Path, endings: tuple[str, ...]) -> str:
     files = sorted(p for p in folder.rglob("*") if p.suffix in endings and "tests" not in p.relative_to(folder).parts)
-    return _digest(
+    return digest(
         text
         for p in files
         for text in (p.relative_to(folder).as_posix(), p.read_text(encoding="utf-8", errors="surrogateescape"))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from hashlib import sha256
 from pathlib import Path, PurePath
 
 import lnc
+from lnc.build import digest, runtime_sources
 from lnc.codegen.languages import TagRuleView, tag_rules
 from lnc.codegen.names import cpp_string, float_literal, unique_names
 from lnc.codegen.wires import PathTable, WireView, wire_views
@@ -90,6 +90,7 @@ class CacheView:
     """A node that may know its wire from an earlier run."""
 
     network: str  # stands for the part of the network that leads to it
+    code: str  # and for the sources that do the work
     nodes: tuple[str, ...]  # the names of its nodes, whose parameters count
 
 
@@ -377,16 +378,17 @@ class _Builder:
         return f"({' || '.join(served)})" if len(served) > 1 else "".join(served)
 
     def cache(self, n: ScheduledNode) -> CacheView:
-        """What a cached wire is made from; operators count with their source, for they may be changed."""
+        """What a cached wire is made from, and by which sources."""
         names = self.upstream(self.sources(n), through_caches=True)
         nodes = [self.by_name[name] for name in sorted(names) if not self.by_name[name].op.cached]
-        lines = [lnc.__version__, *(f"{tag.name} {tag.globs}" for tag in self.schedule.tags)]
+        lines = [f"{tag.name} {tag.globs}" for tag in self.schedule.tags]
         for node in nodes:
             inputs = [(i.port.name, [(t.node, t.weight) for t in i.terms]) for i in node.inputs]
             parameters = [(p.name, getattr(p.value, "text", p.value)) for p in node.parameters]
-            source = (Path(node.op.folder) / f"{node.op.file_stem}.hpp").read_bytes()
-            lines.append(f"{node.name} {node.op.name} {inputs} {parameters} {sha256(source).hexdigest()}")
-        return CacheView(sha256("\n".join(lines).encode()).hexdigest(), tuple(node.name for node in nodes))
+            lines.append(f"{node.name} {node.op.name} {inputs} {parameters}")
+        headers = sorted({Path(node.op.folder) / f"{node.op.file_stem}.hpp" for node in nodes})
+        code = [lnc.__version__, runtime_sources(), *(header.read_text("utf-8") for header in headers)]
+        return CacheView(digest(lines), digest(code), tuple(node.name for node in nodes))
 
     def skip(self, n: ScheduledNode) -> SkipView:
         """The condition of a node as tables; one too long for them becomes "always"."""

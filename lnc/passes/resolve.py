@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from os.path import normpath
 
 from lnc.conversions import cheapest_chains
 from lnc.diagnostics import Related, Reporter, did_you_mean, quote
@@ -119,7 +120,7 @@ class _Resolver:
                     message = "declarations belong into a folder of an operator library"
                     self.reporter.error("LN0110", statement.span, message, help="give its folder by --ops")
         written: list[Tap | Probe | Lightmap] = [*taps, *probes, *lightmaps]
-        self._check_distinct([(result.file, result.span) for result in written])
+        self._check_distinct([(result.file, result.span) for result in written] + self._caches())
         if image is None and not written and not self.reporter.failed:
             start = self.file.statements[0].span if self.file.statements else self.file.span
             self.reporter.error("LN0109", start, "the network has no result", help="add: image WIRE")
@@ -142,12 +143,18 @@ class _Resolver:
             self.reporter.error("LN0104", span, f"{what}, not {quote(path)}")
 
     def _check_distinct(self, files: list[tuple[str, Span]]) -> None:
-        """No two results may be written to the same file."""
+        """No two results, and no two caches, may be written to the same file."""
         first: dict[str, Span] = {}
         for path, span in files:
-            if path in first:
-                self._twice(span, f"two results are written to the file {quote(path)}", first[path])
-            first.setdefault(path, span)
+            place = normpath(path)
+            if place in first:
+                self._twice(span, f"the file {quote(path)} is written twice", first[place])
+            first.setdefault(place, span)
+
+    def _caches(self) -> list[tuple[str, Span]]:
+        """The files that wires are kept in, with the places that say so."""
+        given = [node.parameter("file") for node in self.nodes if node.op.cached]
+        return [(str(file.value), file.given.span) for file in given if file and file.given]
 
     def _expectation(self, statement: ast.Expect) -> list[Expectation]:
         report_unknown_tags(statement.path, self.tags, self.reporter, self.broken)

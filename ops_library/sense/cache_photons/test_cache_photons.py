@@ -1,5 +1,6 @@
 """CachePhotons: the same picture without tracing again; and whatever is stale or damaged is said and made anew."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -71,3 +72,35 @@ def test_a_cache_that_cannot_be_written_is_a_warning(kept, tmp_path):
     (tmp_path / "photons.cache").mkdir()
     _, traced, said = kept()
     assert traced and "warning: photons.cache: " in said and "this cache is not kept" in said
+
+
+def test_other_sources(kept, compiled_network, run_program, tmp_path):
+    """An operator that has been changed makes the cache stale, though network and parameters are the same."""
+    kept()
+    family = tmp_path / "ops" / "mine"
+    shutil.copytree(Path(__file__).parents[2] / "propagate" / "particle_tracer", family / "particle_tracer")
+    header = family / "particle_tracer" / "particle_tracer.hpp"
+    header.write_text(header.read_text() + "// changed\n")
+    changed = compiled_network("kept_by_others", text=NETWORK, ops=tmp_path / "ops")
+    run = run_program(changed, SCENES / "cornell_box.gltf", *OPTIONS)
+    assert run.status == 0 and run.stats["rays"]["photon"] > 0
+    assert "photons.cache: this cache is not used, it was made by another version of its operators" in run.stderr
+
+
+TWO = """
+network two
+light  = Lights()
+first  = CachePhotons(ParticleTracer(light, count = 1k), file = "first.cache")
+second = CachePhotons(ParticleTracer(light, count = 2k), file = "second.cache")
+expect <= L (D|G|S)* E
+image  NNDensity(first) - NNDensity(second)
+"""
+
+
+def test_two_caches_want_two_files(compiled_network, run_program, tmp_path):
+    program = compiled_network("two", text=TWO)
+    for name in ("first.cache", "./first.cache", str(tmp_path / "first.cache")):
+        run = run_program(program, SCENES / "cornell_box.gltf", *OPTIONS, "--set", f"second.file={name}")
+        assert run.status == 1 and not run.picture.exists()
+        assert "'first' and 'second' are to be kept in this one file" in run.stderr
+        assert not (tmp_path / "first.cache").exists()

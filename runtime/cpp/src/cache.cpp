@@ -14,20 +14,20 @@ namespace ln {
 namespace {
 
 constexpr char kMagic[8] = {'L', 'N', 'C', 'A', 'C', 'H', 'E', '\n'};
-constexpr std::uint32_t kVersion = 1;  // of everything below and of what encode() writes
+constexpr std::uint32_t kVersion = 2;  // of everything below and of what encode() writes
 
 /// The beginning of the file.
 struct Header {
   char magic[8];
   std::uint32_t version;
   char representation[20];
-  Fingerprint scene, network;
+  Fingerprint scene, network, code;
   std::uint64_t seed;
   std::uint64_t payload_size;
   Fingerprint payload;
   Fingerprint header;  // of everything before
 };
-static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 112, "no gaps");
+static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 128, "no gaps");
 
 Fingerprint fingerprint(const Header& header) {
   Fingerprint f;
@@ -42,6 +42,7 @@ Header make_header(std::string_view representation, const CacheKey& key, const s
   representation.copy(header.representation, sizeof header.representation - 1);
   header.scene = key.scene;
   header.network = key.network;
+  header.code = key.code;
   header.seed = key.seed;
   header.payload_size = payload.size();
   header.payload.add(payload);
@@ -177,6 +178,7 @@ std::string load_cache(const std::string& path, std::string_view representation,
   if (header.header != fingerprint(header)) throw Error("it is damaged");
   if (std::string_view(header.representation) != representation) throw Error("it holds " + std::string(header.representation));
   if (header.scene != key.scene) throw Error("it was made for another scene");
+  if (header.code != key.code) throw Error("it was made by another version of its operators or of the runtime library");
   if (header.network != key.network) throw Error("it was made by another network, or with other parameters");
   if (header.seed != key.seed) throw Error("it was made with seed " + std::to_string(header.seed));
   std::string payload(bytes.substr(sizeof header));

@@ -87,10 +87,20 @@ void PrepareStep::operator()(NodeId node, FunctionRef<void(PrepareContext&)> wor
   seconds_[node] += watch.seconds();
 }
 
-CacheKey PrepareStep::cache_key(const char* network, std::initializer_list<const char*> nodes) {
+void PrepareStep::claim(const std::string& file, NodeId cache) {
+  std::error_code ignored;
+  const auto [place, is_new] = files_.emplace(std::filesystem::weakly_canonical(std::filesystem::absolute(file, ignored), ignored), cache);
+  if (is_new) return;
+  const std::string one = run_.program.nodes[place->second].name, other = run_.program.nodes[cache].name;
+  throw Error(printable(file) + ": '" + one + "' and '" + other + "' are to be kept in this one file: give one of them another by --set " + other +
+              ".file=NAME");
+}
+
+CacheKey PrepareStep::cache_key(const char* network, const char* code, std::initializer_list<const char*> nodes) {
   if (!scene_) scene_ = fingerprint(context_.scene().data(), environment_);
-  CacheKey key{*scene_, {}, context_.seed()};
+  CacheKey key{*scene_, {}, {}, context_.seed()};
   key.network.add(std::string_view(network));
+  key.code.add(std::string_view(code));
   for (const ParameterSlot& slot : run_.program.parameters) {
     const auto same = [&](const char* name) { return std::string_view(name) == slot.node; };
     if (std::any_of(nodes.begin(), nodes.end(), same)) key.network.add(std::string(slot.node) + "." + slot.name + "=" + parameter_text(slot));

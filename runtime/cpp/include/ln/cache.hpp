@@ -2,7 +2,7 @@
 // Wires that are kept in files between runs.
 //
 // A cache holds what one wire stores, and what it was made from: the scene, the part of the network that leads to it with its
-// parameters, and the seed. Where any of them differs, or the file is damaged, it is not used, a note says why, and the wire is
+// parameters, the sources of its operators and of this library, and the seed. Where any of them differs, or the file is damaged, it is not used, a note says why, and the wire is
 // computed and written again.
 
 #include <cstdint>
@@ -56,6 +56,7 @@ Fingerprint fingerprint(const SceneData& scene, const Image* environment);
 /// What a cached wire is made from.
 struct CacheKey {
   Fingerprint scene, network;
+  Fingerprint code;  // of the operators and of the runtime library that make it
   std::uint64_t seed = 0;
 };
 

@@ -12,6 +12,8 @@
 //   void wires(Visit&&) const                    visit(WireInfo, what the wire carries) for each wire but emission (verify.hpp)
 
 #include <atomic>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -43,17 +45,21 @@ class PrepareStep {
   PrepareStep(PrepareContext& context, RunContext& run, std::vector<double>& seconds, const Image* environment, bool caches = true)
       : context_(context), run_(run), seconds_(seconds), environment_(environment), caches_(caches) {}
 
-  /// Lets a cache look whether it has its wire from an earlier run. `network` stands for the part of the network that leads to it;
-  /// the parameters of its `nodes` count as they are now.
+  /// Lets a cache look whether it has its wire from an earlier run. `network` stands for the part of the network that leads to it,
+  /// `code` for the sources that do the work; the parameters of its `nodes` count as they are now. Throws Error if another cache
+  /// has the same file.
   template <class Cache>
-  void open(Cache& cache, const char* network, std::initializer_list<const char*> nodes) {
-    if (caches_) cache.open(context_, cache_key(network, nodes));
+  void open(Cache& cache, const char* network, const char* code, std::initializer_list<const char*> nodes) {
+    if (!caches_) return;
+    claim(cache.file, cache.node);
+    cache.open(context_, cache_key(network, code, nodes));
   }
 
   void operator()(NodeId node, FunctionRef<void(PrepareContext&)> work);
 
  private:
-  CacheKey cache_key(const char* network, std::initializer_list<const char*> nodes);
+  void claim(const std::string& file, NodeId cache);
+  CacheKey cache_key(const char* network, const char* code, std::initializer_list<const char*> nodes);
 
   PrepareContext& context_;
   RunContext& run_;
@@ -61,6 +67,7 @@ class PrepareStep {
   const Image* environment_;
   bool caches_;
   std::optional<Fingerprint> scene_;
+  std::map<std::filesystem::path, NodeId> files_;  // of caches
 };
 
 /// Watches, from a thread of its own, which node each tracer is at, and so shares out the time of the picture.

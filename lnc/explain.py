@@ -10,6 +10,7 @@ from lnc.diagnostics.format import printable
 from lnc.driver import Result, describe_paths
 from lnc.library import Library, Operator, Parameter
 from lnc.network import Node, PathReport, ScheduledNode, TypedNetwork
+from lnc.syntax.ast import TagRef
 
 
 def print_page(page: Page) -> str:
@@ -101,9 +102,9 @@ def _mode(node: ScheduledNode) -> str:
 
 
 def _tags(node: Node) -> list[str]:
-    """Where the wire is wanted: the tag of `to`, or nothing for everywhere."""
+    """Where the wire is wanted: the tag of `to`, perhaps negated, or nothing for everywhere."""
     to = node.parameter("to")
-    return [to.value] if to and isinstance(to.value, str) else []
+    return [to.value.text] if to and isinstance(to.value, TagRef) else []
 
 
 # --- The library ------------------------------------------------------------------------------------------------------

@@ -235,7 +235,7 @@ class _OperatorReader:
             tail: ast.PathExpression | None = None
             if rest:
                 tail = ast.PathConcat(rest, item.span) if len(rest) > 1 else rest[0]
-            if isinstance(head, ast.PathName) and head.name in names:
+            if isinstance(head, ast.PathName) and head.name in names and not head.negated:
                 rules.append(PathRule(item.content, head.name, head.tag.name if head.tag else None, tail))
             elif isinstance(head, ast.PathEvents) and head.letters == "L":
                 rules.append(PathRule(item.content, None, head.tag.name if head.tag else None, tail))
@@ -254,8 +254,8 @@ class _OperatorReader:
 
         def walk(path: ast.PathExpression) -> None:
             match path:
-                case ast.PathName(name, tag):
-                    if kinds.get(name) != "path" or (tag and kinds.get(tag.name) != "tags"):
+                case ast.PathName(name, tag, negated=negated):
+                    if negated or kinds.get(name) != "path" or (tag and kinds.get(tag.name) != "tags"):
                         self._error(path.span, f"'{path.span.text}' is no path parameter of this operator")
                 case ast.PathConcat(items) | ast.PathUnion(items):
                     for part in items:

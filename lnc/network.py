@@ -12,7 +12,7 @@ from lnc.library import Operator, Parameter, Port, Scalar
 from lnc.paths.automaton import EventTable
 from lnc.paths.language import Alphabet
 from lnc.source import Span
-from lnc.syntax.ast import PathExpression, Value
+from lnc.syntax.ast import PathExpression, TagRef, Value
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ class PathValue:
 
 @dataclass(frozen=True)
 class ParameterValue:
-    """A parameter with its value in SI units; None is a tags parameter that is not given."""
+    """A parameter with its value in SI units; None is a tags parameter that is not given: everywhere."""
 
     declaration: Parameter
-    value: Scalar | PathValue | None
+    value: Scalar | PathValue | TagRef | None
     given: Value | None  # as written in the network; None where the default stands
 
     @property
@@ -198,7 +198,7 @@ class ScheduledNode:
 
     `identifier` is unique among nodes and no C++ keyword; it is `name` wherever that is possible.
     `recursive`: lies on a pull cycle. `head`: is read, on a cycle, by a node that comes before it or by itself,
-    so it must be declared ahead. `receivers`: the tag of `to`, or None for everywhere.
+    so it must be declared ahead. `receivers`: where `to` wants the wire, None for everywhere.
     `line`, `text`: where the user wrote it, for comments.
     """
 
@@ -211,7 +211,7 @@ class ScheduledNode:
     prepares: bool
     recursive: bool
     head: bool
-    receivers: str | None
+    receivers: TagRef | None
     origin: str
     reason: str
     file: str

@@ -82,7 +82,7 @@ def test_layout_is_stable(text: str) -> None:
 # --- Well-formed networks ---------------------------------------------------------------------------------------------
 
 tags = st.sampled_from(["t", "u"])
-letters = st.sampled_from(["D", "G", "S", "[DG]", ".", "D@t", "S@!u", "t", "(D|G)@u", "()"])
+letters = st.sampled_from(["D", "G", "S", "[DG]", ".", "D@t", "S@!u", "t", "!u", "(D|G)@u", "()"])
 via = st.recursive(
     letters,
     lambda inner: st.one_of(
@@ -109,6 +109,7 @@ def networks(draw: st.DrawFn) -> str:
         term,
         st.tuples(term, st.sampled_from(["+", "-"]), term).map(" ".join),
         st.just("Direct(light, to = t)"),
+        st.just("Direct(light, to = !u)"),
         st.just("NNDensity(photons)"),
         st.just("NNDensity(photons as PhotonMap, neighbours = 9)"),
     )

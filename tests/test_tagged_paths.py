@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import shutil
+
 import numpy as np
 
 from benchmarks import exr
@@ -36,6 +39,33 @@ tap    floor_d -> "floor_d.exr"
 tap    mixed -> "mixed.exr"
 """
 
+COMPLEMENTS = """
+network complements
+tag floor = material "Floor"
+tag lamp  = node "Lamp"
+light    = Lights()
+direct   = Direct(light)
+bounce   = PathTracer(direct)
+from_on  = PathTracer(direct, from = floor)
+from_off = PathTracer(direct, from = !floor)
+to_on    = Scale(bounce, to = floor)
+to_off   = Scale(bounce, to = !floor)
+via_off  = PathTracer(direct, via = !floor)
+lamps    = Direct(Lights(from = lamp))
+others   = Direct(Lights(from = !lamp))
+expect L S* E | L (D|G) S* E
+image  direct
+tap    direct -> "direct.exr"
+tap    bounce -> "bounce.exr"
+tap    from_on -> "from_on.exr"
+tap    from_off -> "from_off.exr"
+tap    to_on -> "to_on.exr"
+tap    to_off -> "to_off.exr"
+tap    via_off -> "via_off.exr"
+tap    lamps -> "lamps.exr"
+tap    others -> "others.exr"
+"""
+
 FROM_THE_LIGHT = """
 network tagged_photons
 tag floor = material "Floor"
@@ -60,6 +90,41 @@ def test_steps_of_a_path_tracer(compiled_network, run_program):
     np.testing.assert_allclose(layer["on"] + layer["off"], layer["diffuse"], rtol=1e-5, atol=1e-7)
     np.testing.assert_allclose(layer["any"], layer["any_from"], rtol=1e-5, atol=1e-7)
     np.testing.assert_allclose(layer["floor_d"] + layer["specular"], layer["mixed"], rtol=1e-5, atol=1e-7)
+
+
+def errors_from_zero(difference: np.ndarray) -> float:
+    """The mean of a picture of independent pixels, in standard errors."""
+    pixels = difference.mean(axis=-1)
+    return abs(pixels.mean()) / (pixels.std() / np.sqrt(pixels.size))
+
+
+def test_negated_tags_are_complements(compiled_network, run_program):
+    run = run_program(compiled_network("complements", text=COMPLEMENTS), SCENE, *SIZE, "--samples", "16")
+    assert run.status == 0, run.stderr
+    names = ("direct", "bounce", "from_on", "from_off", "to_on", "to_off", "via_off", "lamps", "others")
+    layer = {name: exr.read(run.picture.with_name(f"{name}.exr")) for name in names}
+    for side in ("from", "to"):
+        parts = layer[f"{side}_on"], layer[f"{side}_off"]
+        assert min(part.max() for part in parts) > 0
+        np.testing.assert_allclose(sum(parts), layer["bounce"], rtol=1e-5, atol=1e-7)
+    np.testing.assert_array_equal(layer["via_off"], layer["from_off"])
+    assert min(layer["lamps"].max(), layer["others"].max()) > 0
+    assert errors_from_zero(layer["lamps"] + layer["others"] - layer["direct"]) < 4
+
+
+def test_the_environment_has_no_tags(compiled_network, run_program, tmp_path):
+    """A scene without lights is lit by a sky, which `from = !lamp` takes and `from = lamp` does not."""
+    model = json.loads((SCENES / "plane_area.gltf").read_text())
+    for material in model["materials"]:
+        material.pop("emissiveFactor", None)
+    shutil.copy(SCENES / "plane_area.bin", tmp_path)
+    (tmp_path / "dark.gltf").write_text(json.dumps(model))
+    options = (*SIZE, "--samples", "16")
+    run = run_program(compiled_network("complements", text=COMPLEMENTS), tmp_path / "dark.gltf", *options)
+    assert run.status == 0 and "using a clear sky" in run.stderr
+    assert exr.read(tmp_path / "lamps.exr").max() == 0
+    others = exr.read(tmp_path / "others.exr")
+    assert others.max() > 0 and errors_from_zero(others - exr.read(tmp_path / "direct.exr")) < 4
 
 
 def difference_in_errors(compiled_network, run_program, name: str, **paths: str) -> float:

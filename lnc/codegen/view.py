@@ -18,6 +18,7 @@ from lnc.passes.conditions import Formula, holds
 from lnc.paths.language import EMITTERS, EVENTS, Alphabet
 from lnc.paths.regex import Renderer
 from lnc.paths.weighted import CountTable
+from lnc.syntax.ast import TagRef
 
 LETTER_KINDS = len(EMITTERS) + len(EVENTS)
 
@@ -104,7 +105,7 @@ class NodeView:
     inputs: tuple[InputView, ...]
     tables: tuple[TableView, ...]
     skip: str  # the flag that says that the node carries no light; empty: it always may
-    receivers: str  # the tags that `to` restricts the wire to; empty: everywhere
+    receivers: str  # where `to` wants the wire; empty: everywhere
     prepares: bool
     guard: str  # a C++ condition for its preparation; empty: always
     cache: CacheView | None
@@ -319,7 +320,7 @@ class _Builder:
             inputs=tuple(argument for i in n.inputs for argument in self.arguments(n, i)),
             tables=tables,
             skip=self.flags.get(n.identifier, ""),
-            receivers="" if n.receivers is None else self.tag_set(n.receivers),
+            receivers=self.selection(n.receivers) if n.receivers else "",
             prepares=n.prepares,
             guard=self.guard(n),
             cache=self.cache(n) if n.op.cached else None,
@@ -432,7 +433,7 @@ class _Builder:
         value = p.value
         kind = p.declaration.type
         if kind == "tags":
-            return "ln::kAnyTag" if value is None else self.tag_set(str(value))
+            return self.selection(value) if isinstance(value, TagRef) else "ln::TagSelection()"
         if kind == "text" and p.name == "layer":
             return str(self.layer(str(value), self.light.seen_paths.get(n.name, "")))
         if kind == "text":
@@ -445,8 +446,8 @@ class _Builder:
             raise InternalError(f"parameter {n.name}.{p.name} has the value {value!r}")
         return str(int(value)) if kind == "count" else float_literal(value)
 
-    def tag_set(self, tag: str) -> str:
-        return f"ln::TagSet{{1}} << {self.tag_bits[tag]}"
+    def selection(self, tag: TagRef) -> str:
+        return f"ln::TagSelection::{'without' if tag.negated else 'with'}({self.tag_bits[tag.name]})"
 
     def layer(self, name: str, light_paths: str, terms: tuple[TermView, ...] = ()) -> int:
         """Number of the layer called `name`, a new one."""
@@ -597,12 +598,12 @@ class _Builder:
         )
 
     def on_surfaces(self, name: str, seen: set[str]) -> bool:
-        """Is a wire known on surfaces only? Stored irradiance is, and what `to` restricts to surfaces with a tag."""
+        """Is a wire known on surfaces only? Stored irradiance is, and what `to` wants on surfaces with a tag."""
         if name in seen:
             return False
         seen.add(name)
         n = self.by_name[name]
-        if "irradiance" in n.contents or n.receivers is not None:
+        if "irradiance" in n.contents or (n.receivers is not None and not n.receivers.negated):
             return True
         passed = {rule.port for rule in n.op.paths if rule.content == "unchanged"}
         sources = [term.node for i in n.inputs if i.port.name in passed for term in i.terms]

@@ -85,7 +85,7 @@ given by position, or by name with a single wire: PathTracer(in = direct).""",
     Page(
         "LN0106",
         "defined twice",
-        """A wire, a tag, the image, a layer of the picture, the file of a result or of a cache, or the network's name is
+        """A wire, a tag, the image, a layer of the picture, the file of a result or a cache, or the network's name is
 defined a second time. Order does not matter in a network, so neither can replace the other.""",
         "light = Lights()\nlight = Lights()\nimage Direct(light)\n",
     ),

@@ -11,7 +11,7 @@ On entry: any syntax tree. On exit: no macro, no `use`, no call of a macro. Span
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from lnc.diagnostics import Related, Reporter, did_you_mean, quote
@@ -210,6 +210,8 @@ class _Expander:
                 wire = instance.wires[value.name]
                 if isinstance(wire, ast.WireName):
                     argument = argument.changed(value=value.changed(name=wire.name))
+            elif isinstance(value, ast.PathLiteral):
+                argument = argument.changed(value=value.changed(path=_with_tags(value.path, instance.values)))
             replaced.append(argument)
         return tuple(replaced)
 
@@ -289,3 +291,29 @@ class _Expander:
                 self.reporter.error("LN0103", argument.name_span, message, help=help)
             elif argument.name in values:
                 values[argument.name] = argument.value
+
+
+def _with_tags(path: ast.PathExpression, values: Mapping[str, ast.Value]) -> ast.PathExpression:
+    """The path with the tags that are parameters of a macro replaced by their values."""
+
+    def chosen(tag: ast.TagRef) -> ast.TagRef:
+        match values.get(tag.name):
+            case ast.NameValue(name):
+                return tag.changed(name=name)
+            case ast.PathLiteral(ast.PathName(name, None, negated=negated)):
+                return tag.changed(name=name, negated=negated != tag.negated)
+        return tag
+
+    match path:
+        case ast.PathConcat(items) | ast.PathUnion(items):
+            return path.changed(items=tuple(_with_tags(item, values) for item in items))
+        case ast.PathRepeat(item):
+            return path.changed(item=_with_tags(item, values))
+        case ast.PathTagged(item, tag):
+            return path.changed(item=_with_tags(item, values), tag=chosen(tag))
+        case ast.PathEvents(tag=ast.TagRef() as tag):
+            return path.changed(tag=chosen(tag))
+        case ast.PathName(name, tag, span, negated):
+            named = chosen(ast.TagRef(name, negated, span))
+            return path.changed(name=named.name, negated=named.negated, tag=chosen(tag) if tag else None)
+    return path

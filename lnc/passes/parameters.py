@@ -19,7 +19,7 @@ WANTED = {
     "flag": "true or false",
     "text": "a text in quotation marks",
     "path": "a light path such as (D|G|S)*",
-    "tags": "the name of a tag",
+    "tags": "a tag such as floor or !floor",
     "count": "a whole number such as 200k",
     "number": "a number",
     "ratio": "a ratio such as 1%",
@@ -55,7 +55,7 @@ def parameter_value(
 
 def _convert(
     parameter: Parameter, value: ast.Value, tags: Collection[str], reporter: Reporter, broken: frozenset[str]
-) -> Scalar | PathValue:
+) -> Scalar | PathValue | ast.TagRef:
     match parameter.type, value:
         case kind, ast.NumberValue(text) if kind in UNITS:
             return _in_range(parameter, number(text, kind), text)
@@ -67,20 +67,25 @@ def _convert(
             if not text or len(text) > 200 or not text.isprintable():
                 raise ValueFault("a text of 1 to 200 printable characters is wanted")
             return text
-        case "tags", ast.NameValue(name):
-            if name not in tags:
-                help = did_you_mean(name, tags) or f'define it: tag {name} = material "..."'
-                if name in broken:
-                    raise ValueFault("")
-                reporter.error("LN0102", value.span, f"no tag is called {quote(name)}", help=help)
-                raise ValueFault("")
-            return name
+        case "tags", ast.NameValue(name, span):
+            return _known_tag(ast.TagRef(name, False, span), tags, reporter, broken)
+        case "tags", ast.PathLiteral(ast.PathName(name, None, span, negated)):
+            return _known_tag(ast.TagRef(name, negated, span), tags, reporter, broken)
         case "path", ast.NameValue(name):
             return _path(parameter, _letters_or_tag(name, value.span), tags, reporter, broken)
         case "path", ast.PathLiteral(path):
             return _path(parameter, path, tags, reporter, broken)
     wanted = f"one of {', '.join(parameter.choices)}" if parameter.type == "choice" else WANTED[parameter.type]
     raise ValueFault(f"{wanted} is wanted, not {quote(value.span.text)}")
+
+
+def _known_tag(tag: ast.TagRef, tags: Collection[str], reporter: Reporter, broken: frozenset[str]) -> ast.TagRef:
+    if tag.name in tags:
+        return tag
+    if tag.name not in broken:
+        help = did_you_mean(tag.name, tags) or f'define it: tag {tag.name} = material "..."'
+        reporter.error("LN0102", tag.span, f"no tag is called {quote(tag.name)}", help=help)
+    raise ValueFault("")
 
 
 def _in_range(parameter: Parameter, value: Scalar, text: str) -> Scalar:

@@ -231,9 +231,7 @@ class PathAutomaton:
 
     def _tagged(self, node: Node, parameter: str) -> int:
         """The tag combinations that a tags parameter selects."""
-        value = node.parameter(parameter)
-        tag = value.value if value else None
-        return self.alphabet.combinations_with(tag if isinstance(tag, str) else None)
+        return self.alphabet.where(tag_value(node, parameter))
 
 
 def _steps_after(node: Node) -> int | None:
@@ -251,9 +249,7 @@ def _filled(node: Node, tail: ast.PathExpression) -> ast.PathExpression:
     """The tail with path and tags parameters replaced by their values."""
     match tail:
         case ast.PathEvents(_, tag) if tag is not None:
-            chosen = node.parameter(tag.name)
-            name = chosen.value if chosen else None
-            return tail.changed(tag=tag.changed(name=name) if isinstance(name, str) else None)
+            return tail.changed(tag=tag_value(node, tag.name))
         case ast.PathName(name):
             value = node.parameter(name)
             return value.value.expression if value and isinstance(value.value, PathValue) else tail
@@ -264,7 +260,15 @@ def _filled(node: Node, tail: ast.PathExpression) -> ast.PathExpression:
     return tail
 
 
+def tag_value(node: Node, parameter: str) -> ast.TagRef | None:
+    """What a tags parameter selects; None: everything."""
+    given = node.parameter(parameter)
+    return given.value if given and isinstance(given.value, ast.TagRef) else None
+
+
 def first_tag_parameter(tail: ast.PathExpression | None) -> str | None:
-    """`via@from` -> `from`."""
+    """The parameter that says where the first event of a rule lies: `from` of `via@from` and of `(D@from)+`."""
     head = tail.items[0] if isinstance(tail, ast.PathConcat) else tail
-    return head.tag.name if isinstance(head, ast.PathName) and head.tag else None
+    if isinstance(head, ast.PathRepeat) and head.low > 0:
+        head = head.item
+    return head.tag.name if isinstance(head, ast.PathName | ast.PathEvents) and head.tag else None

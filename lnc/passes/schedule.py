@@ -13,6 +13,7 @@ from lnc.library import POINTS
 from lnc.network import Network, Node, Schedule, ScheduledInput, ScheduledNode, Tap, Term
 from lnc.passes.check_cycles import wire_sources
 from lnc.source import Span
+from lnc.syntax.ast import TagRef
 
 TEXT_LIMIT = 400
 CPP_WORDS = frozenset(
@@ -87,7 +88,7 @@ def _scheduled(
         prepares=node.op.prepares,
         recursive=recursive,
         head=head,
-        receivers=to.value if to and to.declaration.type == "tags" and isinstance(to.value, str) else None,
+        receivers=to.value if to and isinstance(to.value, TagRef) else None,
         origin=node.origin,
         reason=node.reason,
         file=node.statement.source.name,

@@ -11,6 +11,7 @@ from __future__ import annotations
 from lnc.diagnostics import Related, Reporter
 from lnc.network import Network, PathValue, TypedNetwork
 from lnc.paths.language import TAG_LIMIT, Alphabet, tags_in
+from lnc.syntax.ast import TagRef
 
 
 def typecheck(network: Network, reporter: Reporter) -> TypedNetwork:
@@ -29,8 +30,8 @@ def _alphabet(network: Network, reporter: Reporter) -> Alphabet:
     used: set[str] = set()
     for node in network.nodes:
         for parameter in node.parameters:
-            if parameter.declaration.type == "tags" and isinstance(parameter.value, str):
-                used.add(parameter.value)
+            if isinstance(parameter.value, TagRef):
+                used.add(parameter.value.name)
             elif isinstance(parameter.value, PathValue):
                 used |= tags_in(parameter.value.expression)
     for expectation in network.expectations:

@@ -55,12 +55,13 @@ class Alphabet:
             return self.eye
         if event == "L":
             if tag is None or tag.name not in EMITTERS:
-                return self.emitters(None, self._where(tag))
+                return self.emitters(None, self.where(tag))
             kind = tag.name if not tag.negated else EMITTERS[1 - EMITTERS.index(tag.name)]
             return self.emitters(kind)
-        return self.events(event, self._where(tag))
+        return self.events(event, self.where(tag))
 
-    def _where(self, tag: ast.TagRef | None) -> int:
+    def where(self, tag: ast.TagRef | None) -> int:
+        """The tag combinations that are meant, as a bit set; all of them for None."""
         return self.combinations_with(None) if tag is None else self.combinations_with(tag.name, tag.negated)
 
 
@@ -110,9 +111,9 @@ def add_path(nfa: Nfa, path: ast.PathExpression | None, start: int, alphabet: Al
             end = nfa.state()
             nfa.edge(start, within & sum(alphabet.letters(letter, tag) for letter in letters), end)
             return end
-        case ast.PathName(name, tag):
+        case ast.PathName(name, tag, negated=negated):
             end = nfa.state()
-            named = alphabet.events(EVENTS, alphabet.combinations_with(name))
+            named = alphabet.events(EVENTS, alphabet.combinations_with(name, negated))
             if tag is not None:
                 named &= alphabet.events(EVENTS, alphabet.combinations_with(tag.name, tag.negated))
             nfa.edge(start, within & named, end)

@@ -21,11 +21,15 @@ class Comments(Record):
 
 
 class TagRef(Record):
-    """`@mirror`, `@!mirror`, `@delta`."""
+    """`@mirror`, `@!mirror`, `@delta`; the value of a tags parameter."""
 
     name: str
     negated: bool
     span: Span
+
+    @property
+    def text(self) -> str:
+        return f"!{self.name}" if self.negated else self.name
 
 
 class PathEvents(Record):
@@ -37,11 +41,12 @@ class PathEvents(Record):
 
 
 class PathName(Record):
-    """A name in a path: a tag; in a declaration also a port or a path parameter."""
+    """A name in a path: a tag, or with `negated` what has it not; in a declaration a port or a path parameter."""
 
     name: str
     tag: TagRef | None
     span: Span
+    negated: bool = False
 
 
 class PathTagged(Record):

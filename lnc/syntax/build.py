@@ -260,7 +260,7 @@ class Builder:
         return ast.PathEvents("".join(c for c in "LDGSE" if c in letters), None, span)
 
     def path_name(self, span: Span, children: Children) -> ast.PathName:
-        return ast.PathName(children[0].text, None, span)
+        return ast.PathName(children[-1].text, None, span, len(children) > 1)
 
     def path_group(self, span: Span, children: Children) -> ast.PathExpression:
         return children[0] if children else ast.PathEmpty(span)
@@ -359,7 +359,7 @@ def _as_value(value: Any) -> ast.Value:
     """A path that is one plain word could be any name: leave that to the declared type."""
     if isinstance(value, ast.NumberValue | ast.TextValue | ast.FlagValue):
         return value
-    if isinstance(value, ast.PathName) and value.tag is None:
+    if isinstance(value, ast.PathName) and value.tag is None and not value.negated:
         return ast.NameValue(value.name, value.span)
     if isinstance(value, ast.PathEvents | ast.PathConcat) and value.span.text.isalpha():
         return ast.NameValue(value.span.text, value.span)
@@ -370,7 +370,7 @@ def _with_tag(item: ast.PathExpression, tag: ast.TagRef, span: Span) -> ast.Path
     if isinstance(item, ast.PathEvents) and item.tag is None:
         return ast.PathEvents(item.letters, tag, span)
     if isinstance(item, ast.PathName) and item.tag is None:
-        return ast.PathName(item.name, tag, span)
+        return item.changed(tag=tag, span=span)
     return ast.PathTagged(item, tag, span)
 
 

@@ -213,8 +213,8 @@ def _path(path: ast.PathExpression, within: int) -> str:
         case ast.PathEvents(letters, tag):
             known = {"DGS": "."}.get(letters)
             return (known or (letters if len(letters) == 1 else f"[{letters}]")) + _tag(tag)
-        case ast.PathName(name, tag):
-            return name + _tag(tag)
+        case ast.PathName(name, tag, negated=negated):
+            return "!" * negated + name + _tag(tag)
         case ast.PathEmpty():
             return "()"
         case ast.PathTagged(item, tag):
@@ -244,9 +244,7 @@ def _quantifier(low: int, high: int | None) -> str:
 
 
 def _tag(tag: ast.TagRef | None) -> str:
-    if tag is None:
-        return ""
-    return f"@{'!' if tag.negated else ''}{tag.name}"
+    return f"@{tag.text}" if tag else ""
 
 
 def _indent(lines: Sequence[str]) -> list[str]:

@@ -8,12 +8,11 @@ namespace ln::ops {
 /// The mean irradiance of surfaces; see average_ambient.ln.
 struct AverageAmbient {
   NodeId node;
-  TagSet from = kAnyTag;
+  TagSelection from;
 
   void prepare(PrepareContext& context, const QuadTree& in) {
     const Scene& scene = context.scene();
-    mean_ = in.mean(
-        [&](std::uint32_t face) { return from == kAnyTag || (scene.part_tags(in.patches().part(face / 2)) & from) != 0; });
+    mean_ = in.mean([&](std::uint32_t face) { return from(scene.part_tags(in.patches().part(face / 2))); });
   }
 
   template <class Request>

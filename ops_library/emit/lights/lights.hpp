@@ -7,13 +7,13 @@ namespace ln::ops {
 /// The emitters of the scene; see lights.ln.
 struct Lights {
   NodeId node;
-  TagSet from = kAnyTag;
+  TagSelection from;
 
   void prepare(PrepareContext& context) {
-    if (from == kAnyTag) {
+    if (from.everything()) {
       emitters_ = &context.scene().emitters();
     } else {
-      owned_ = context.scene().emitters_tagged(from);
+      owned_ = context.scene().selected_emitters(from);
       emitters_ = owned_.get();
     }
   }

@@ -10,7 +10,7 @@ template <class Via>
 struct Gather {
   NodeId node;
   std::int64_t samples = 1;
-  TagSet from = kAnyTag;
+  TagSelection from;
 
   template <class Request, class In>
   LN_INLINE Color answer(Request& request, const In& in) const {

@@ -10,7 +10,7 @@ template <class Via>
 struct PathTracer {
   NodeId node;
   std::int64_t max_depth = 0;
-  TagSet from = kAnyTag;
+  TagSelection from;
 
   template <class Request, class In>
   LN_INLINE Color answer(Request& request, const In& in) const {

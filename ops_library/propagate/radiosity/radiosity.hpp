@@ -15,7 +15,7 @@ struct Radiosity {
   float smallest = 0;  // [m]; 0: automatic
   float residual = 1e-3f;
   std::int64_t iterations = 200;
-  TagSet from = kAnyTag, to = kAnyTag;
+  TagSelection from, to;
 
   void prepare(PrepareContext& context, const QuadTree& in) {
     const auto unit = static_cast<float>(context.scene().data().unit);

@@ -417,7 +417,7 @@ class Solver {
     QuadTree tree(patches_);
     for (std::uint32_t i = 0; i < shape_.faces.size(); ++i) {
       const Face& face = shape_.faces[i];
-      const bool wanted = options_.to == kAnyTag || (scene.part_tags(patches_->part(face.id / 2)) & options_.to) != 0;
+      const bool wanted = options_.to(scene.part_tags(patches_->part(face.id / 2)));
       if (!face.receives || !wanted) continue;
       std::vector<QuadTreeNode> nodes{{irradiance_[i]}};
       std::vector<std::uint32_t> from{i};

@@ -29,10 +29,6 @@ class DisjointSets {
   std::vector<std::uint32_t> parent_;
 };
 
-bool tagged(const Scene& scene, std::uint32_t part, TagSet tags) {
-  return tags == kAnyTag || (scene.part_tags(part) & tags) != 0;
-}
-
 }  // namespace
 
 Hierarchy::Hierarchy(PrepareContext& context, NodeId node, const QuadTree& in, const RadiosityOptions& options)
@@ -101,8 +97,8 @@ void Hierarchy::add_face(std::uint32_t id, const RadiosityOptions& options) {
   Face face;
   face.id = id;
   const bool diffuse = scatters_diffusely(scene, part, Patches::is_front(id));
-  face.scatters = diffuse && tagged(scene, part, options.from);
-  face.receives = face.scatters || (diffuse && tagged(scene, part, options.to));
+  face.scatters = diffuse && options.from(scene.part_tags(part));
+  face.receives = face.scatters || (diffuse && options.to(scene.part_tags(part)));
   face.enclosed = enclosed_[id] != 0;
   face.albedo_varies = face.scatters && albedo_varies(scene, part);
   if (face.scatters && !face.albedo_varies)

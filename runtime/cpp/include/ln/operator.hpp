@@ -21,13 +21,12 @@
 
 namespace ln {
 
-/// Is the request at a surface with one of the tags `to`? Generated programs ask it for the parameter `to`, which no operator
-/// sees itself.
+/// Is the request at a surface that `to` selects? Generated programs ask it for the parameter `to`, which no operator sees
+/// itself. What is on no surface has no tags.
 template <class Request>
-bool reaches(Request& request, TagSet to) {
-  if (to == kAnyTag) return true;
+bool reaches(Request& request, TagSelection to) {
   const std::uint32_t part = request.at().part;
-  return part != kNoPart && (request.tracer().scene().part_tags(part) & to);
+  return to(part == kNoPart ? 0 : request.tracer().scene().part_tags(part));
 }
 
 /// A path expression of one event: the events that it allows on a surface. `Via` is a generated automaton:

@@ -11,8 +11,8 @@ struct RadiosityOptions {
   float smallest = 0;      // cells of half this side are not made [normalised units]; 0: 1/128 of the scene's half diagonal
   float residual = 1e-3f;  // bound of what further iterations would add, as a share of the result
   std::int64_t iterations = 200;
-  TagSet from = kAnyTag;  // parts with one of these tags scatter
-  TagSet to = kAnyTag;    // parts with one of these tags receive
+  TagSelection from;  // parts that scatter
+  TagSelection to;    // parts that receive
 };
 
 /// What it cost, and how far it got.

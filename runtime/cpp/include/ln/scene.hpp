@@ -15,7 +15,24 @@ namespace ln {
 
 /// A set of the network's tags, one bit each in the order in which the network declares them.
 using TagSet = std::uint64_t;
-inline constexpr TagSet kAnyTag = ~TagSet{0};
+
+/// What a parameter of a network selects: everything, what has a tag, or what has it not.
+class TagSelection {
+ public:
+  constexpr TagSelection() = default;  // everything
+  static constexpr TagSelection with(int tag) { return {TagSet{1} << tag, false}; }
+  static constexpr TagSelection without(int tag) { return {TagSet{1} << tag, true}; }
+
+  constexpr bool everything() const { return tag_ == 0; }
+  /// Is something with these tags selected?
+  constexpr bool operator()(TagSet tags) const { return ((tags & tag_) != 0) != negated_; }
+
+ private:
+  constexpr TagSelection(TagSet tag, bool negated) : tag_(tag), negated_(negated) {}
+
+  TagSet tag_ = 0;
+  bool negated_ = true;
+};
 
 /// The tags with the given numbers among `tags`: bit i is set if numbers[i] is.
 inline std::uint32_t tag_mask(TagSet tags, const int* numbers, int count) {
@@ -84,8 +101,8 @@ class Scene {
   const Accel& accel() const { return accel_; }
   /// All emitters.
   const Emitters& emitters() const { return *emitters_; }
-  /// The emitters with one of these tags.
-  std::unique_ptr<Emitters> emitters_tagged(TagSet tags) const;
+  /// The emitters that are selected by their tags. The environment has none.
+  std::unique_ptr<Emitters> selected_emitters(const TagSelection& from) const;
   /// The emitters that are selected by number, with or without the environment.
   std::unique_ptr<Emitters> selected_emitters(const EmitterSelection& selection, bool with_environment) const;
   /// Bit t is set if the part matches tag t of the network.

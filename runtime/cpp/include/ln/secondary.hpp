@@ -6,15 +6,15 @@
 namespace ln {
 
 /// Radiance from the point that `ray` hit, weighted as the surface scatters it that `ray` left: what the point scatters by the events
-/// of `Via` (see single_step) of the illumination `in`. `beta`, `depth`, `steps`: of the request at that surface. Only points with one of
-/// the tags `from` send light. `kScene`: as in Request. Paths end by Russian roulette. The one function of a pull cycle that is not
+/// of `Via` (see single_step) of the illumination `in`. `beta`, `depth`, `steps`: of the request at that surface. Only points that
+/// `from` selects send light. `kScene`: as in Request. Paths end by Russian roulette. The one function of a pull cycle that is not
 /// inlined.
 template <class Via, Events kScene, class In>
 LN_NOINLINE Color secondary_light(Tracer& tracer, const SampleStream& random, const BsdfRay& ray, const Color& beta, std::uint32_t depth,
-                                  std::uint32_t steps, TagSet from, In in) {
+                                  std::uint32_t steps, TagSelection from, In in) {
   const Scene& scene = tracer.scene();
   const Interaction at(scene, ray.ray, ray.hit);
-  if (from != kAnyTag && !(scene.part_tags(at.part) & from)) return Color(0);
+  if (!from.everything() && !from(scene.part_tags(at.part))) return Color(0);
   return with_step(Via{}, scene, at.part, [&]<Events kVia>() __attribute__((always_inline)) {
     if (!any(at.bsdf().events() & kVia & kScene)) return Color(0);
 

@@ -29,4 +29,29 @@ LN_NOINLINE Color secondary_light(Tracer& tracer, const SampleStream& random, co
   });
 }
 
+/// The mean over `samples` directions of their own, drawn as the request draws its shared sample.
+template <class Via, class Request, class In>
+LN_NOINLINE Color light_along_directions(Request& request, NodeId node, std::int64_t samples, TagSelection from, const In& in) {
+  const auto n = static_cast<std::uint32_t>(samples);
+  const float share = 1 / static_cast<float>(n);
+  Color sum(0);
+  for (std::uint32_t j = 0; j < n; ++j) {
+    const SampleStream random = request.random().branch(request.depth(), j, n);
+    BsdfRay ray;
+    if (!request.trace_sample(random, node, ray) || !ray.hit.found()) continue;
+    sum += secondary_light<Via, Request::scene_events>(request.tracer(), random, ray, request.beta() * share, request.depth(), request.steps(), from, in);
+  }
+  return sum * share;
+}
+
+/// What the receiver of `request` makes of light from surfaces (see secondary_light) that `samples` directions find, drawn from its
+/// BSDF at the cost of `node`. A single one is the shared sample, and so is one that is given.
+template <class Via, class Request, class In>
+LN_INLINE Color light_from_surfaces(Request& request, NodeId node, std::int64_t samples, TagSelection from, const In& in) {
+  if (samples > 1 && !request.sample_given()) return light_along_directions<Via>(request, node, samples, from, in);
+  const BsdfRay* ray = request.bsdf_ray(node);
+  if (!ray || !ray->hit.found()) return Color(0);
+  return secondary_light<Via, Request::scene_events>(request.tracer(), request.random(), *ray, request.beta(), request.depth(), request.steps(), from, in);
+}
+
 }  // namespace ln

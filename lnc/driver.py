@@ -1,7 +1,7 @@
 """The spine: the rooms that a network walks through, in order.
 
-parse -> expand_macros -> resolve -> typecheck -> insert_converters -> check_cycles -> contents -> schedule
-      -> check_paths                 (-> light_paths, for explain and graph)                (-> codegen, build)
+parse -> expand_macros -> resolve -> typecheck -> insert_converters -> narrow_converters -> check_cycles -> contents
+      -> schedule -> check_paths     (-> light_paths, for explain and graph)                (-> codegen, build)
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from lnc.passes.check_paths import check_paths
 from lnc.passes.contents import contents
 from lnc.passes.expand_macros import expand_macros
 from lnc.passes.insert_converters import insert_converters
+from lnc.passes.narrow_converters import narrow_converters
 from lnc.passes.resolve import resolve
 from lnc.passes.schedule import print_schedule, schedule
 from lnc.passes.sound_part import sound_part
@@ -116,7 +117,7 @@ def compile_network(source: SourceFile, library: Library, dump: Dump | None = No
 
     typed = insert_converters(sound(), library, reporter)
     _check_inserted(typed, reporter)
-    typed = sound()
+    typed = narrow_converters(sound())
     check_cycles(typed.network, reporter)
     typed = sound()
     well_typed = not reporter.failed

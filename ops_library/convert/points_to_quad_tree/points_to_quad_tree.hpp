@@ -13,11 +13,12 @@ struct PointsToQuadTree {
   float cell = 0;  // [m]; 0: automatic
   std::int64_t depth = 9;
   float error = 0.01f;
+  TagSelection to;
 
   template <class In>
   void prepare(PrepareContext& context, const In& in) {
     const auto unit = static_cast<float>(context.scene().data().unit);
-    const QuadTreeSampling options{static_cast<int>(samples), cell / unit, static_cast<int>(depth), error};
+    const QuadTreeSampling options{static_cast<int>(samples), cell / unit, static_cast<int>(depth), error, to};
     tree_ =
         sample_quad_tree(context, node, options, [&](Tracer& tracer, const SampleStream& random, const Hit& hit, bool front) {
           tracer.enter(node);

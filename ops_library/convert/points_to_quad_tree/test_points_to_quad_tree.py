@@ -52,3 +52,45 @@ def test_fewer_cells_for_a_larger_error(compiled_network, run_program):
     ]
     assert errors[0] < 0.02
     assert 0.05 < errors[1] < 0.3
+
+
+def test_a_part_of_the_scene(compiled_network, run_program, tmp_path):
+    """Sampled on walls only, the tree holds nothing elsewhere, and there the same as a whole one, to its error."""
+    text = """
+network part_of_scene
+tag walls = mesh "Wall*"
+direct = Direct(Lights())
+tree   = PointsToQuadTree(direct, to = walls)
+part   = QuadTreeToPoints(tree)
+there  = QuadTreeToPoints(tree, to = walls)
+whole  = QuadTreeToPoints(PointsToQuadTree(direct), to = walls)
+tap    part -> "part.exr"
+tap    there -> "there.exr"
+tap    whole -> "whole.exr"
+"""
+    program = compiled_network("part_of_scene", text=text)
+    run = run_program(program, SCENES / "glossy_tags.glb", "--size", "40x30", "--samples", "64")
+    assert run.status == 0, run.stderr
+    part, there, whole = (exr.read(tmp_path / f"{name}.exr") for name in ("part", "there", "whole"))
+    assert (part == there).all() and whole.max() > 0
+    assert part.mean() == pytest.approx(whole.mean(), rel=0.01)
+    assert abs(part - whole).mean() < 0.03 * whole.mean()
+
+
+def test_only_what_is_read_is_sampled(compiled_network, run_program):
+    """An inserted converter samples the surfaces that scatter, one that is written out all."""
+    text = """
+network {name}
+tag walls = mesh "Wall*"
+direct   = Direct(Lights())
+indirect = Radiosity({source}, from = walls, error = 20%)
+expect <= L S* E | L D@walls+ D S* E
+image  indirect
+"""
+    rays = {}
+    for name, source in (("narrow", "direct"), ("wide", "PointsToQuadTree(direct)")):
+        program = compiled_network(name, text=text.format(name=name, source=source))
+        run = run_program(program, SCENES / "glossy_tags.glb", "--size", "8x6", "--samples", "4")
+        assert run.status == 0, run.stderr
+        rays[name] = next(node["rays"] for node in run.stats["nodes"] if node["op"] == "Direct")
+    assert 0 < rays["narrow"] < 0.6 * rays["wide"]

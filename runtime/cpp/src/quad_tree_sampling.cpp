@@ -73,7 +73,7 @@ class Sampler {
     std::vector<std::uint8_t> wanted(2 * scene.data().parts.size());
     for (std::uint32_t part = 0; part < scene.data().parts.size(); ++part)
       for (std::uint32_t side = 0; side < 2; ++side)
-        wanted[2 * part + side] = scatters_diffusely(scene, part, side == 0) ? 1 : 0;
+        wanted[2 * part + side] = options_.to(scene.part_tags(part)) && scatters_diffusely(scene, part, side == 0) ? 1 : 0;
     std::vector<Cell> cells;
     for (std::uint32_t face = 0; face < faces_.size(); ++face) {
       const std::uint32_t patch = face / 2;

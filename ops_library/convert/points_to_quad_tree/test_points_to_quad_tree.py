@@ -1,5 +1,8 @@
 """PointsToQuadTree: known functions (in C++), and agreement with what it samples on a lit plane."""
 
+import csv
+import itertools
+import math
 import subprocess
 from pathlib import Path
 
@@ -33,6 +36,28 @@ def test_the_picture_is_that_of_the_samples(compiled_network, run_program):
     direct = picture(run_program, compiled_network("direct"))
     assert cells.mean() == pytest.approx(direct.mean(), rel=0.01)
     assert abs(cells - direct).mean() < 0.03 * direct.mean()
+
+
+def test_no_light_comes_through_the_walls_of_a_closed_box(compiled_network, run_program, tmp_path):
+    text = CELLS.replace("image cells", 'probe cells at "sensors.csv" -> "cells.csv"')
+    low, high = (-2.0, -1.5, -3.0), (2.0, 1.5, 2.0)
+    shares = (0.001, 0.01, 0.3, 0.5, 0.77, 0.99, 0.999)  # of the walls' extents: next to edges and corners, too
+    outer, inner = [], []
+    for axis, (wall, outwards), u, v in itertools.product(range(3), ((low, -1.0), (high, 1.0)), shares, shares):
+        share = [u, v]
+        share.insert(axis, 0.0)
+        at = [a + s * (b - a) for a, b, s in zip(low, high, share, strict=True)]
+        for side, sensors in ((1.0, outer), (-1.0, inner)):
+            at[axis] = wall[axis] + 1e-4 * side * outwards
+            sensors.append([*at, *(side * outwards if k == axis else 0.0 for k in range(3))])
+    rows = (",".join(map(repr, row)) + "\n" for row in outer + inner)
+    (tmp_path / "sensors.csv").write_text("".join(rows))
+    run = run_program(compiled_network("furnace_cells", text=text), SCENES / "furnace.gltf")
+    assert run.status == 0, run.stderr
+    with (tmp_path / "cells.csv").open() as file:
+        found = [float(row["E_g"]) for row in csv.DictReader(file)]
+    assert found[: len(outer)] == [0.0] * len(outer)
+    assert found[len(outer) :] == pytest.approx([math.pi] * len(inner), rel=0.01)
 
 
 def test_the_seed_decides_not_the_threads(compiled_network, run_program):

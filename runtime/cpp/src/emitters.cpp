@@ -5,6 +5,16 @@
 
 namespace ln {
 
+namespace {
+
+/// Does the light shine towards `at`, which is `height` above it? Not if that is within the error of the position: on its own
+/// surface and on its back, a light would find directions to itself in what rounding leaves of distances.
+bool shines_on(const AreaLight& light, const SurfacePosition& at, float height) {
+  return std::abs(height) > at.error && light.seen_from(height);
+}
+
+}  // namespace
+
 float Emitters::distant_importance(const DistantLight& light, const Vec3& n) const {
   constexpr float kFloor = 1e-3f;
   const float cos_i = n == Vec3(0) ? 1.0f : -glm::dot(n, light.direction);
@@ -44,7 +54,7 @@ Emitters::Choice Emitters::choose(const Vec3& p, const Vec3& n) const {
 LN_INLINE LightSample Emitters::sample_area(const SurfacePosition& at, const AreaLight& light, float pmf, const Vec2& u) const {
   LightSample result;
   const float height = light.height(at.p);
-  if (!light.seen_from(height)) return result;
+  if (!shines_on(light, at, height)) return result;
   const AreaSample s = sample_solid_angle(light, at.p, height, u);
   result.position = light.at(s.s, s.t);
   const Vec3 d = result.position.p - at.p;
@@ -138,7 +148,7 @@ float Emitters::surface_pdf_w(const Surface& surface, const SurfacePosition& at,
   if (index == kNone) return 0;
   const AreaLight& light = area_[index];
   const float height = light.height(at.p);
-  if (!light.seen_from(height)) return 0;
+  if (!shines_on(light, at, height)) return 0;
   const float solid = solid_angle(light, at.p, height);
   if (!(solid > 0)) return 0;
   float pmf = 1;

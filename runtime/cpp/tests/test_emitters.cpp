@@ -81,6 +81,28 @@ TEST_CASE("irradiance of polygons: Lambert's formula") {
   }
 }
 
+TEST_CASE("a light does not light its own plane, wherever rounding puts a point of it") {
+  Random random(9);
+  for (int i = 0; i < 50; ++i) {
+    SceneOfLights scene;
+    const Vec3 a = 0.5f * random.cube(), e1 = 0.4f * random.cube(), e2 = 0.4f * random.cube();
+    scene.add_quad(a, e1, e2, Color(1), i % 2 == 0);
+    const Emitters emitters(scene.data);
+    const Vec3 n = glm::normalize(glm::cross(e1, e2));
+    for (int k = 0; k < 40; ++k) {
+      const float s = random(), t = random();
+      const Vec3 pa = (1 - s - t) * a, pb = s * (a + e1), pc = t * (a + e2);
+      const SurfacePosition at{pa + pb + pc, position_error(glm::abs(pa) + glm::abs(pb) + glm::abs(pc)), n};
+      for (const float side : {-1.0f, 1.0f}) {
+        CHECK(emitters.sample(at, side * n, random(), random.square()).pdf_w == 0);
+        CHECK(emitters.pdf_w(at, side * n, hit_of(0), n) == 0);
+      }
+      const SurfacePosition above{at.p + 1e-4f * n, at.error, n};
+      CHECK(emitters.sample(above, -n, random(), random.square()).pdf_w > 0);
+    }
+  }
+}
+
 TEST_CASE("point, spot and directional lights: closed forms") {
   const Vec3 n = glm::normalize(Vec3(0.1f, 0.2f, 1)), p(0.1f, -0.2f, 0.05f);
   SceneOfLights point, spot, directional;

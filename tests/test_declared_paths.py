@@ -80,6 +80,7 @@ SLOW = f"""network slow
 {TAGS}
 photons = ParticleTracer(light, count = 50k, via = (D|S)@!small S?)
 density = NNDensity(photons)
+varying = LepskiDensity(photons)
 fitted  = SurfaceDE(photons)
 reduced = TriMeshReducer(fitted)
 
@@ -93,6 +94,7 @@ average = AverageAmbient(bounced, to = small)
 
 tap reduced -> "reduced.glb"
 tap density -> "density.exr"
+tap varying -> "varying.exr"
 tap gradients -> "gradients.exr"
 tap average -> "average.exr"
 """
@@ -120,6 +122,7 @@ WIRES = {
     "CacheTriMesh": ["mesh"],
     "TriMeshToPoints": ["smooth"],
     "NNDensity": ["density"],
+    "LepskiDensity": ["varying"],
     "SurfaceDE": ["fitted"],
     "TriMeshReducer": ["reduced"],
     "IGSampler": ["gradients"],

@@ -8,13 +8,14 @@ namespace ln::ops {
 /// Irradiance at the vertices of a mesh, from photons by surface; see surface_de.ln.
 struct SurfaceDE {
   NodeId node;
-  std::int64_t neighbours = 400;
+  std::int64_t neighbours = 1600;
+  std::int64_t fewest = 100;
   float radius = 0;  // [m]; 0: automatic
   float spacing = 0.5f;
 
   void prepare(PrepareContext& context, const SortedPhotons& photons) {
     const auto unit = static_cast<float>(context.scene().data().unit);
-    mesh_ = photon_mesh(context, photons, {node, static_cast<int>(neighbours), radius / unit, spacing});
+    mesh_ = photon_mesh(context, photons, {node, {static_cast<int>(fewest), static_cast<int>(neighbours), radius / unit}, spacing});
   }
 
   /// The TriMesh wire.

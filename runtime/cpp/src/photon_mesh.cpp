@@ -1,8 +1,10 @@
 #include "ln/photon_mesh.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <optional>
+#include <tuple>
 #include <unordered_map>
 
 #include "ln/disjoint_sets.hpp"
@@ -14,6 +16,14 @@ namespace {
 
 /// Edges are halved so many times at most: far below what photons can tell, and domain coordinates remain exact.
 constexpr int kMaxLevels = 20;
+
+/// A wall is what stands at this height [radii of the kernel] across the way between two points, not along it; at least so far
+/// from both [distances between them].
+constexpr float kWallHeight = 0.02f, kWallMinCos = 0.05f, kWallInset = 1e-3f;
+/// Edges below a wall are halved down to this share of the length that others may have.
+constexpr float kWallSpacing = 1.0f / 32;
+/// Vertices below a wall are seen from points that are so far to its sides [radii; ways to the middle of a triangle, at most].
+constexpr float kWallOffset = 0.02f, kWallMaxOffset = 0.25f;
 
 /// A surface with more photons than this is sorted by all threads together.
 constexpr std::size_t kManyPhotons = 1 << 16;
@@ -37,6 +47,9 @@ struct Vertex {
   std::uint32_t surface;
   KernelRadii radii{};
 };
+
+/// Of a triangle's edges, from corner k to the next: are they to be halved?
+using LongEdges = std::array<bool, 3>;
 
 /// A triangle of a face, to be split or done.
 struct Piece {
@@ -84,17 +97,19 @@ class MeshBuilder {
     std::vector<Piece> pieces = whole_faces();
     for (int level = 0; !pieces.empty(); ++level) {
       choose_radii();
+      const std::vector<LongEdges> long_edges = find_long_edges(pieces, level);
       std::vector<Piece> next;
-      for (const Piece& piece : pieces) split(piece, level < kMaxLevels, next);
+      for (std::size_t i = 0; i < pieces.size(); ++i) split(pieces[i], long_edges[i], next);
       pieces.swap(next);
     }
+    part_at_walls();
     return estimate();
   }
 
  private:
   void sort_photons() {
     const auto sort = [&](std::size_t i) {
-      surfaces_[i].emplace(context_, area_, sorted_, static_cast<std::uint32_t>(i), options_.neighbours, options_.max_radius);
+      surfaces_[i].emplace(context_, area_, sorted_, static_cast<std::uint32_t>(i), options_.kernels);
     };
     for (std::size_t i = 0; i < surfaces_.size(); ++i)
       if (sorted_.on(i).size() > kManyPhotons) sort(i);
@@ -170,11 +185,42 @@ class MeshBuilder {
     });
   }
 
-  /// Is an edge longer than the kernels at its ends allow? Both sides of it agree, so there are no cracks.
-  bool too_long(std::uint32_t a, std::uint32_t b) const {
+  /// Is an edge longer than the kernels at its ends allow, or a wall across it? Both sides of it agree, so there are no cracks.
+  bool too_long(std::uint32_t a, std::uint32_t b, Tracer& tracer) const {
+    if (a > b) std::swap(a, b);
     const Vertex& p = vertices_[a];
     const Vertex& q = vertices_[b];
-    return glm::distance(p.around.point, q.around.point) > options_.spacing * 0.5f * (p.radii.mean() + q.radii.mean());
+    const float length = glm::distance(p.around.point, q.around.point), radius = 0.5f * (p.radii.mean() + q.radii.mean());
+    if (length > options_.spacing * radius) return true;
+    if (!(length > kWallSpacing * options_.spacing * radius)) return false;
+    return wall_between(p.around.point, q.around.point, p.around.normal, q.around.normal, kWallHeight * radius, tracer);
+  }
+
+  /// Does a wall stand between two points of a surface with these normals?
+  bool wall_between(const Vec3& a, const Vec3& b, const Vec3& normal_a, const Vec3& normal_b, float height,
+                    Tracer& tracer) const {
+    const Vec3 start = a + height * normal_a, way = b + height * normal_b - start;
+    const float length = glm::length(way);
+    if (!(length > 0)) return false;
+    const Vec3 direction = way / length;
+    const Ray ray{start + kWallInset * way, direction, (1 - 2 * kWallInset) * length};
+    const Hit hit = tracer.intersect(ray, 0, options_.node, RayKind::shadow);
+    SurfacePosition wall;
+    if (hit.found()) tracer.scene().locate(hit, wall);
+    return hit.found() && std::abs(glm::dot(wall.ng, direction)) > kWallMinCos;
+  }
+
+  /// By piece.
+  std::vector<LongEdges> find_long_edges(const std::vector<Piece>& pieces, int level) {
+    std::vector<LongEdges> found(pieces.size(), LongEdges{});
+    if (level == kMaxLevels) return found;
+    context_.for_chunks(pieces.size(), 64, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::uint32_t* const v = pieces[i].triangle.vertex;
+        for (std::size_t k = 0; k < 3; ++k) found[i][k] = too_long(v[k], v[(k + 1) % 3], tracer);
+      }
+    });
+    return found;
   }
 
   /// The vertex in the middle of an edge.
@@ -193,23 +239,21 @@ class MeshBuilder {
   }
 
   /// Splits a triangle at the middles of its edges that are too long, or is done with it.
-  void split(const Piece& piece, bool may_split, std::vector<Piece>& next) {
+  void split(const Piece& piece, const LongEdges& is_long, std::vector<Piece>& next) {
     const MeshTriangle& t = piece.triangle;
-    bool is_long[3];
-    int count = 0;
-    for (int k = 0; k < 3; ++k) count += is_long[k] = may_split && too_long(t.vertex[k], t.vertex[(k + 1) % 3]);
+    const auto count = std::count(is_long.begin(), is_long.end(), true);
     if (count == 0) {
       done_.push_back(piece);
       return;
     }
     // Corners a, b, c such that, of one or two long edges, the one unlike the others is ab.
-    int first = 0;
+    std::size_t first = 0;
     while (count < 3 && is_long[first] != (count == 1)) ++first;
     struct Node {
       Vec2 st;
       std::uint32_t vertex;
     };
-    const auto corner = [&](int k) { return Node{t.corner[(first + k) % 3], t.vertex[(first + k) % 3]}; };
+    const auto corner = [&](std::size_t k) { return Node{t.corner[(first + k) % 3], t.vertex[(first + k) % 3]}; };
     const auto between = [&](const Node& p, const Node& q) {
       const Vec2 st = 0.5f * (p.st + q.st);
       return Node{st, middle({piece.face, st})};
@@ -252,6 +296,102 @@ class MeshBuilder {
       if (!hit.found() || glm::dot(at.ng, direction) < 0) ++others;
     }
     return others <= kMost;
+  }
+
+  /// A point near a triangle's corner, inside of it.
+  Vec3 inside(const Piece& piece, std::size_t k) const {
+    const std::uint32_t* const v = piece.triangle.vertex;
+    const Vertex& corner = vertices_[v[k]];
+    const Vec3 middle = (vertices_[v[0]].around.point + vertices_[v[1]].around.point + vertices_[v[2]].around.point) / 3.0f;
+    const Vec3 way = middle - corner.around.point;
+    return corner.around.point + std::min(kWallMaxOffset, kWallOffset * corner.radii.mean() / glm::length(way)) * way;
+  }
+
+  /// An edge of a triangle: its vertices, the lesser first, and the triangle's corners there, 3 * piece + corner.
+  struct Edge {
+    std::uint32_t low, high, at_low, at_high;
+  };
+
+  /// Those of all triangles; the same edge of two triangles one after the other.
+  std::vector<Edge> sorted_edges() const {
+    std::vector<Edge> edges;
+    edges.reserve(3 * done_.size());
+    for (std::uint32_t i = 0; i < done_.size(); ++i) {
+      const std::uint32_t* const v = done_[i].triangle.vertex;
+      for (std::uint32_t k = 0; k < 3; ++k) {
+        const std::uint32_t next = (k + 1) % 3;
+        if (v[k] < v[next])
+          edges.push_back({v[k], v[next], 3 * i + k, 3 * i + next});
+        else
+          edges.push_back({v[next], v[k], 3 * i + next, 3 * i + k});
+      }
+    }
+    std::sort(edges.begin(), edges.end(), [](const Edge& x, const Edge& y) {
+      return std::tie(x.low, x.high, x.at_low) < std::tie(y.low, y.high, y.at_low);
+    });
+    return edges;
+  }
+
+  std::uint32_t& vertex_at(std::uint32_t corner) { return done_[corner / 3].triangle.vertex[corner % 3]; }
+
+  /// Does a wall stand between two triangles beside their common corner?
+  bool parted(std::uint32_t x, std::uint32_t y, Tracer& tracer) const {
+    const Vertex& vertex = vertices_[done_[x / 3].triangle.vertex[x % 3]];
+    const float radius = vertex.radii.mean();
+    const Vec3 n = vertex.around.normal;
+    return std::isfinite(radius) &&
+           wall_between(inside(done_[x / 3], x % 3), inside(done_[y / 3], y % 3), n, n, kWallHeight * radius, tracer);
+  }
+
+  /// Numbers the sides of all vertices: corners of neighbouring triangles that see each other are on the same side of a vertex.
+  std::vector<std::uint32_t> side_of_corner(std::uint32_t& count) {
+    const std::vector<Edge> edges = sorted_edges();
+    std::vector<std::array<bool, 2>> joined(edges.size(), {false, false});  // with the edge before: at `low`, at `high`
+    context_.for_chunks(edges.size(), 256, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
+      for (std::size_t i = std::max<std::size_t>(begin, 1); i < end; ++i) {
+        const Edge &e = edges[i], &before = edges[i - 1];
+        if (e.low != before.low || e.high != before.high) continue;
+        joined[i] = {!parted(before.at_low, e.at_low, tracer), !parted(before.at_high, e.at_high, tracer)};
+      }
+    });
+    DisjointSets sets(3 * done_.size());
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      if (joined[i][0]) sets.join(edges[i - 1].at_low, edges[i].at_low);
+      if (joined[i][1]) sets.join(edges[i - 1].at_high, edges[i].at_high);
+    }
+    return sets.labels(count);
+  }
+
+  /// Gives a vertex below a wall one copy for each side of it, each seen from the middle of points on that side.
+  void part_at_walls() {
+    std::uint32_t count = 0;
+    const std::vector<std::uint32_t> side = side_of_corner(count);
+    std::vector<std::uint32_t> vertex_of_side(count, Patches::kNone);
+    std::vector<Vec4> seen_from(vertices_.size(), Vec4(0));
+    std::vector<bool> is_known(vertices_.size(), false), has_sides(vertices_.size(), false);
+    for (std::uint32_t x = 0; x < side.size(); ++x) {
+      const std::uint32_t v = vertex_at(x);
+      std::uint32_t& mine = vertex_of_side[side[x]];
+      if (mine == Patches::kNone && !is_known[v]) {
+        mine = v;
+        is_known[v] = true;
+      } else if (mine == Patches::kNone) {
+        mine = static_cast<std::uint32_t>(vertices_.size());
+        vertices_.push_back(Vertex(vertices_[v]));
+        seen_from.emplace_back(0);
+        has_sides.push_back(true);
+        has_sides[v] = true;
+      }
+      seen_from[mine] += Vec4(inside(done_[x / 3], x % 3), 1);
+    }
+    for (std::uint32_t x = 0; x < side.size(); ++x) vertex_at(x) = vertex_of_side[side[x]];
+    context_.for_chunks(vertices_.size(), 64, [&](std::size_t begin, std::size_t end, Tracer&) {
+      for (std::size_t v = begin; v < end; ++v) {
+        if (!has_sides[v]) continue;
+        vertices_[v].around.point = Vec3(seen_from[v]) / seen_from[v].w;
+        vertices_[v].radii = surfaces_[vertices_[v].surface]->radii(vertices_[v].around);
+      }
+    });
   }
 
   TriMesh estimate() {

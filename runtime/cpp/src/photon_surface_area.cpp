@@ -10,8 +10,9 @@ namespace {
 
 // Lengths are in radii of the ball from here on.
 
-/// Directions in which the surface is measured.
-constexpr int kDirections = 32;
+/// Directions in which the surface is measured: more of them where moments are wanted, as weights made of these are sensitive to
+/// a strip of surface between a point and a border that it is near to.
+constexpr int direction_count(PhotonKernel kernel) { return kernel == PhotonKernel::parabola ? 128 : 32; }
 /// Parts of equal area along each direction, for telling what is covered twice.
 constexpr int kRings = 64;
 /// Height over the surface from which it is seen: what stands higher, and not along it, hides what is behind.
@@ -21,18 +22,18 @@ constexpr float kMinBlockerDistance = 1e-3f;
 /// Where less than this share of the surface is visible (grass, leaves), blockers are not considered.
 constexpr float kMinVisibleShare = 0.1f;
 
+template <int count>
 struct Directions {
-  alignas(32) float x[kDirections], y[kDirections];
+  alignas(32) float x[count], y[count];
 
   Directions() {
-    for (int j = 0; j < kDirections; ++j) {
-      const float angle = (static_cast<float>(j) + 0.5f) * (2 * kPi / kDirections);
+    for (int j = 0; j < count; ++j) {
+      const float angle = (static_cast<float>(j) + 0.5f) * (2 * kPi / count);
       x[j] = std::cos(angle);
       y[j] = std::sin(angle);
     }
   }
 };
-const Directions kDirection;
 
 /// Integral of the kernel over a disc of radius sqrt(q), as a share of pi; q: squared distance.
 template <PhotonKernel kernel>
@@ -99,7 +100,8 @@ class Sweep {
   SurfaceMoments whole_moments() const { return scaled(whole_); }
 
  private:
-  static constexpr int kQuadrant = kDirections / 4;
+  static constexpr int kDirections = direction_count(kernel), kQuadrant = kDirections / 4;
+  static inline const Directions<kDirections> kDirection;
 
   /// Of a triangle: height over the tangent plane is h0 + gx x + gy y, area over projected area is tilt.
   struct Plane {
@@ -183,9 +185,13 @@ class Sweep {
     }
   }
 
-  static SurfaceMoments scaled(SurfaceMoments m) {
-    for (float* value : {&m.one, &m.x, &m.y, &m.xx, &m.xy, &m.yy}) *value *= kPi / kDirections;
-    return m;
+  /// From sums over directions to integrals; the powers of the place, too, are integrated over the sector of each direction.
+  static SurfaceMoments scaled(const SurfaceMoments& sums) {
+    constexpr float kSector = 2 * kPi / kDirections;
+    const float scale = 0.5f * kSector;
+    const float first = scale * std::sin(0.5f * kSector) / (0.5f * kSector), second = scale * std::sin(kSector) / kSector;
+    const float even = scale * 0.5f * (sums.xx + sums.yy), odd = second * 0.5f * (sums.xx - sums.yy);
+    return {scale * sums.one, first * sums.x, first * sums.y, even + odd, second * sums.xy, even - odd};
   }
 
   /// The rings within the squared distance q.
@@ -255,69 +261,88 @@ SurfaceArea::SurfaceArea(PrepareContext& context, const SceneData& data) : data_
   // Bound groups of triangles, then groups of groups.
   const auto empty_boxes = [] {
     Boxes boxes;
-    std::fill(&boxes.low[0][0], &boxes.low[0][0] + 3 * kWidth, kInfinity);
-    std::fill(&boxes.high[0][0], &boxes.high[0][0] + 3 * kWidth, -kInfinity);
+    for (auto* low : {&boxes.low, &boxes.normal_low}) std::fill(&(*low)[0][0], &(*low)[0][0] + 3 * kWidth, kInfinity);
+    for (auto* high : {&boxes.high, &boxes.normal_high}) std::fill(&(*high)[0][0], &(*high)[0][0] + 3 * kWidth, -kInfinity);
     return boxes;
   };
-  const auto include = [](Boxes& boxes, std::size_t lane, const Vec3& low, const Vec3& high) {
+  const auto include = [](float (&lows)[3][kWidth], float (&highs)[3][kWidth], std::size_t lane, const Vec3& low, const Vec3& high) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      boxes.low[axis][lane] = std::min(boxes.low[axis][lane], low[axis]);
-      boxes.high[axis][lane] = std::max(boxes.high[axis][lane], high[axis]);
+      lows[axis][lane] = std::min(lows[axis][lane], low[axis]);
+      highs[axis][lane] = std::max(highs[axis][lane], high[axis]);
     }
   };
   std::vector<Boxes> lowest((count - 1) / (kLeaf * kWidth) + 1, empty_boxes());
   for (std::size_t i = 0; i < count; ++i) {
     const UVec3 t = data.triangles[triangles_[i]];
     const Vec3 a = data.positions[t.x], b = data.positions[t.y], c = data.positions[t.z];
-    include(lowest[i / (kLeaf * kWidth)], i / kLeaf % kWidth, glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c)));
+    const Vec3 normal = glm::normalize(glm::cross(b - a, c - a));
+    Boxes& boxes = lowest[i / (kLeaf * kWidth)];
+    const std::size_t lane = i / kLeaf % kWidth;
+    include(boxes.low, boxes.high, lane, glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c)));
+    if (is_finite(normal)) include(boxes.normal_low, boxes.normal_high, lane, normal, normal);  // others have no area
   }
   levels_.push_back(std::move(lowest));
   while (levels_.back().size() > 1) {
     const std::vector<Boxes>& below = levels_.back();
     std::vector<Boxes> above((below.size() - 1) / kWidth + 1, empty_boxes());
     for (std::size_t i = 0; i < below.size(); ++i) {
+      const auto corner = [](const float (&values)[3][kWidth], std::size_t lane) {
+        return Vec3(values[0][lane], values[1][lane], values[2][lane]);
+      };
+      const Boxes& from = below[i];
+      Boxes& to = above[i / kWidth];
       for (std::size_t lane = 0; lane < kWidth; ++lane) {
-        const Boxes& b = below[i];
-        include(above[i / kWidth], i % kWidth, Vec3(b.low[0][lane], b.low[1][lane], b.low[2][lane]),
-                Vec3(b.high[0][lane], b.high[1][lane], b.high[2][lane]));
+        include(to.low, to.high, i % kWidth, corner(from.low, lane), corner(from.high, lane));
+        include(to.normal_low, to.normal_high, i % kWidth, corner(from.normal_low, lane), corner(from.normal_high, lane));
       }
     }
     levels_.push_back(std::move(above));
   }
 }
 
-int SurfaceArea::collect(const Neighbourhood& around, float radius, std::uint32_t* found) const {
+template <class Use>
+void SurfaceArea::for_near(const Neighbourhood& around, float radius, Use&& use) const {
+  if (levels_.empty()) return;
   struct Pending {
     std::uint32_t level, index;
   };
   Pending stack[16 * kWidth];
-  int depth = 0, count = 0;
+  int depth = 0;
   stack[depth++] = {static_cast<std::uint32_t>(levels_.size() - 1), 0};
-  const float limit = radius * radius;
-  const Vec3 p = around.point;
+  const float limit = radius * radius, eye = kEyeHeight * radius;
+  constexpr float kSlope = Neighbourhood::kMaxSlope;
+  const float steepest = radius * kSlope / std::sqrt(1 + kSlope * kSlope);  // the greatest height in the neighbourhood
+  const Vec3 p = around.point, n = around.normal, facing = around.front ? n : -n;
   while (depth > 0) {
     const Pending at = stack[--depth];
     const Boxes& boxes = levels_[at.level][at.index];
-    float distance2[kWidth];
+    bool near[kWidth];
     for (std::uint32_t i = 0; i < kWidth; ++i) {
-      const float x = std::max(std::max(boxes.low[0][i] - p.x, p.x - boxes.high[0][i]), 0.0f);
-      const float y = std::max(std::max(boxes.low[1][i] - p.y, p.y - boxes.high[1][i]), 0.0f);
-      const float z = std::max(std::max(boxes.low[2][i] - p.z, p.z - boxes.high[2][i]), 0.0f);
-      distance2[i] = x * x + y * y + z * z;
+      float distance2 = 0, lowest = 0, highest = 0, agreement = 0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float low = boxes.low[axis][i] - p[axis], high = boxes.high[axis][i] - p[axis];
+        const float outside = std::max(std::max(low, -high), 0.0f);
+        distance2 += outside * outside;
+        lowest += std::min(n[axis] * low, n[axis] * high);
+        highest += std::max(n[axis] * low, n[axis] * high);
+        agreement += std::max(facing[axis] * boxes.normal_low[axis][i], facing[axis] * boxes.normal_high[axis][i]);
+      }
+      // What faces another way can only hide something, if it is where the surface is seen from.
+      const bool faces = agreement > Neighbourhood::kMinCos && lowest <= steepest && highest >= -steepest;
+      near[i] = distance2 <= limit && (faces || (lowest <= eye && highest >= eye));
     }
     for (std::uint32_t i = 0; i < kWidth; ++i) {
-      if (!(distance2[i] <= limit)) continue;
+      if (!near[i]) continue;
       const std::uint32_t child = at.index * kWidth + i;
       if (at.level > 0) {
         stack[depth++] = {at.level - 1, child};
         continue;
       }
       const std::uint32_t first = child * kLeaf, last = std::min(first + kLeaf, static_cast<std::uint32_t>(triangles_.size()));
-      if (count + static_cast<int>(last - first) > kMaxTriangles) return -1;
-      for (std::uint32_t k = first; k < last; ++k) found[count++] = triangles_[k];
+      for (std::uint32_t k = first; k < last; ++k)
+        if (!use(triangles_[k])) return;
     }
   }
-  return count;
 }
 
 namespace {
@@ -338,22 +363,26 @@ bool crossing(const LocalTriangle& triangle, SurfaceBlocker& line) {
   return true;
 }
 
+}  // namespace
+
+/// False: there are too many triangles.
 template <PhotonKernel kernel>
-void measure_with(const SceneData& data, const Neighbourhood& around, float radius, const std::uint32_t* found, int count,
-                  TriangleFilter filter, SurfaceCoverage& coverage) {
+bool SurfaceArea::measure_with(const Neighbourhood& around, float radius, TriangleFilter filter, SurfaceCoverage& coverage) const {
   const Frame frame = make_frame(around.normal);
   const float side = around.front ? 1.0f : -1.0f;
   const float scale = 1 / radius;
+  coverage.radius = radius;
   coverage.s = frame.s * scale;
   coverage.t = frame.t * scale;
   coverage.blockers = 0;
 
   Sweep<kernel> sweep;
-  LocalTriangle facing[SurfaceArea::kMaxTriangles];
+  LocalTriangle facing[kMaxTriangles];
   int facing_count = 0;
-  for (int i = 0; i < count; ++i) {
-    const UVec3 t = data.triangles[found[i]];
-    const Vec3 a = data.positions[t.x] - around.point, b = data.positions[t.y] - around.point, c = data.positions[t.z] - around.point;
+  bool too_many = false;
+  for_near(around, radius, [&](std::uint32_t triangle) {
+    const UVec3 t = data_->triangles[triangle];
+    const Vec3 a = data_->positions[t.x] - around.point, b = data_->positions[t.y] - around.point, c = data_->positions[t.z] - around.point;
     const Vec3 normal = glm::cross(b - a, c - a);
     const float agreement = glm::dot(normal, around.normal) * side;
     const float ha = glm::dot(a, around.normal) * scale, hb = glm::dot(b, around.normal) * scale, hc = glm::dot(c, around.normal) * scale;
@@ -361,7 +390,9 @@ void measure_with(const SceneData& data, const Neighbourhood& around, float radi
                                {glm::dot(b, coverage.s), glm::dot(b, coverage.t), hb},
                                {glm::dot(c, coverage.s), glm::dot(c, coverage.t), hc}}};
     if (agreement > 0 && agreement * agreement > Neighbourhood::kMinCos * Neighbourhood::kMinCos * glm::dot(normal, normal)) {
-      if (!filter(found[i])) continue;
+      if (!filter(triangle)) return true;
+      too_many = facing_count == kMaxTriangles;
+      if (too_many) return false;
       facing[facing_count] = local;
       if (!around.front) std::swap(facing[facing_count].corner[1], facing[facing_count].corner[2]);  // seen from behind
       ++facing_count;
@@ -374,7 +405,9 @@ void measure_with(const SceneData& data, const Neighbourhood& around, float radi
         ++coverage.blockers;
       }
     }
-  }
+    return true;
+  });
+  if (too_many) return false;
   for (int i = 0; i < facing_count; ++i) sweep.add(facing[i]);
   coverage.area = sweep.visible() * radius * radius;
   coverage.moments = sweep.visible_moments();
@@ -383,9 +416,8 @@ void measure_with(const SceneData& data, const Neighbourhood& around, float radi
     coverage.moments = sweep.whole_moments();
     coverage.blockers = 0;
   }
+  return true;
 }
-
-}  // namespace
 
 bool SurfaceCoverage::hides(const Vec3& offset) const {
   const Vec2 p(glm::dot(offset, s), glm::dot(offset, t));
@@ -402,27 +434,31 @@ bool SurfaceCoverage::hides(const Vec3& offset) const {
 
 void SurfaceArea::measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage,
                           TriangleFilter filter) const {
-  std::uint32_t found[kMaxTriangles];
-  const int count = collect(around, radius, found);
-  if (count < 0) {
-    const SurfaceMoments disc{kPi / 2, 0, 0, kPi / 12, 0, kPi / 12};  // of the parabola
-    const float share = kernel == PhotonKernel::constant ? kPi : kernel == PhotonKernel::cone ? kPi / 3 : disc.one;
-    const Frame frame = make_frame(around.normal);
-    coverage.area = share * radius * radius;
-    coverage.moments = disc;
-    coverage.blockers = 0;
-    coverage.s = frame.s / radius;
-    coverage.t = frame.t / radius;
-    return;
-  }
-  switch (kernel) {
-    case PhotonKernel::constant:
-      return measure_with<PhotonKernel::constant>(*data_, around, radius, found, count, filter, coverage);
-    case PhotonKernel::cone:
-      return measure_with<PhotonKernel::cone>(*data_, around, radius, found, count, filter, coverage);
-    case PhotonKernel::parabola:
-      return measure_with<PhotonKernel::parabola>(*data_, around, radius, found, count, filter, coverage);
-  }
+  const auto fits = [&](float r) {
+    switch (kernel) {
+      case PhotonKernel::constant:
+        return measure_with<PhotonKernel::constant>(around, r, filter, coverage);
+      case PhotonKernel::cone:
+        return measure_with<PhotonKernel::cone>(around, r, filter, coverage);
+      case PhotonKernel::parabola:
+        break;
+    }
+    return measure_with<PhotonKernel::parabola>(around, r, filter, coverage);
+  };
+  constexpr int kHalvings = 10;
+  float r = radius;
+  for (int i = 0; i <= kHalvings; ++i, r *= 0.5f)
+    if (fits(r)) return;
+
+  // A fan of triangles: a full disc.
+  coverage.radius = radius;
+  coverage.moments = {kPi / 2, 0, 0, kPi / 12, 0, kPi / 12};  // of the parabola
+  const float share = kernel == PhotonKernel::constant ? kPi : kernel == PhotonKernel::cone ? kPi / 3 : coverage.moments.one;
+  const Frame frame = make_frame(around.normal);
+  coverage.area = share * radius * radius;
+  coverage.blockers = 0;
+  coverage.s = frame.s / radius;
+  coverage.t = frame.t / radius;
 }
 
 }  // namespace ln

@@ -2,6 +2,7 @@
 // Scenes made by hand for the tests of photons.
 
 #include <cstring>
+#include <functional>
 #include <vector>
 
 #include "ln/photon_tracer.hpp"
@@ -161,6 +162,40 @@ struct OneSmooth {  // D|G, in two states that must be told apart
   static constexpr int next[][3] = {{1, 2, -1}, {-1, -1, -1}, {-1, -1, -1}};
   static constexpr bool accepting[] = {false, true, true};
 };
+
+/// A scene and its photons.
+struct Traced {
+  explicit Traced(const SceneData& data, std::uint64_t count, const PathAutomaton& via = path_automaton<AnyPath>(), int threads = 2)
+      : stage(data, threads), photons(trace_photons(stage.context, 1, stage.scene.emitters(), via, count)) {}
+
+  Stage stage;
+  Photons photons;
+};
+
+/// A horizontal square in one piece or `pieces` x `pieces`, at a height of 0.01.
+inline void add_floor(SceneBuilder& b, int pieces = 1) {
+  b.quad({-0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, -0.7f}, {-0.7f, 0.01f, -0.7f}, b.material(Color(0.5f)), pieces);
+}
+
+/// On the floor, from front to back: a wall without thickness at x = 0, and a roof from its top over all that is left of it.
+inline void add_thin_wall(SceneBuilder& b) {
+  b.quad({0, 0.01f, 0.7f}, {0, 0.01f, -0.7f}, {0, 0.5f, -0.7f}, {0, 0.5f, 0.7f}, b.material(Color(0)));
+  b.quad({0, 0.5f, 0.7f}, {0, 0.5f, -0.7f}, {-0.7f, 0.5f, -0.7f}, {-0.7f, 0.5f, 0.7f}, b.material(Color(0)));
+}
+
+/// Mean of a function over the unit square.
+inline double mean_over_square(const std::function<double(Vec2)>& function, std::uint32_t n = 4000) {
+  const SampleStream random(17, 0);
+  double sum = 0;
+  for (std::uint32_t i = 0; i < n; ++i) sum += function(random.get2(0, i, n));
+  return sum / n;
+}
+
+/// A direction from a point of the unit square, evenly over the sphere.
+inline Vec3 direction_at(const Vec2& u) {
+  const float z = 1 - 2 * u.x, r = safe_sqrt(1 - z * z);
+  return {r * std::cos(2 * kPi * u.y), r * std::sin(2 * kPi * u.y), z};
+}
 
 inline DVec3 total_flux(const Photons& photons) {
   DVec3 sum(0);

@@ -1,8 +1,6 @@
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
-#include <functional>
-
 #include "ln/photon_density.hpp"
 #include "photon_scenes.hpp"
 
@@ -12,22 +10,22 @@ using namespace ln::test;
 namespace {
 
 /// Photons of a scene and estimates of irradiance from them.
-struct Estimate {
+struct Estimate : Traced {
   explicit Estimate(const SceneData& data, std::uint64_t count, int neighbours = 60, PhotonKernel kernel = PhotonKernel::cone,
-                    const PathAutomaton& via = path_automaton<AnyPath>(), std::uint64_t seed = 1)
-      : stage(data, 2, seed), photons(trace_photons(stage.context, 1, stage.scene.emitters(), via, count)), map(stage.context, photons.hits),
-        density(stage.context, map, neighbours, 0, kernel) {}
+                    const PathAutomaton& via = path_automaton<AnyPath>())
+      : Traced(data, count, via), map(stage.context, photons.hits), density(stage.context, map, neighbours, 0, kernel) {}
 
   /// Mean irradiance (first channel) at the points that `place` makes of the unit square.
   double mean(const std::function<Vec3(Vec2)>& place, const Vec3& normal, std::uint32_t n = 4000) const {
-    const SampleStream random(17, 0);
-    double sum = 0;
-    for (std::uint32_t i = 0; i < n; ++i) sum += static_cast<double>(density.irradiance({place(random.get2(0, i, n)), normal, true}).x);
-    return sum / n;
+    return mean_over_square([&](Vec2 u) { return static_cast<double>(density.irradiance({place(u), normal, true}).x); }, n);
   }
 
-  Stage stage;
-  Photons photons;
+  /// Irradiance (first channel) at what a ray hits.
+  double at(const Ray& ray) const {
+    const Interaction x(stage.scene, ray, stage.scene.accel().intersect(ray, 0));
+    return static_cast<double>(density.irradiance({x.at.p, x.front ? x.at.ng : -x.at.ng, x.front}).x);
+  }
+
   PhotonMap map;
   PhotonDensity density;
 };
@@ -71,7 +69,7 @@ TEST_CASE("in a closed box whose walls all shine, the irradiance is the same eve
 
 TEST_CASE("a plane under a directional light is evenly lit up to its border") {
   SceneBuilder b;
-  b.quad({-0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, -0.7f}, {-0.7f, 0.01f, -0.7f}, b.material(Color(0.5f)));
+  add_floor(b);
   b.directional({0.3f, -1, 0.2f}, Color(3));
   const Estimate e(b.data, 400'000);
   const double truth = 3 / std::sqrt(1 + 0.09 + 0.04);
@@ -82,7 +80,7 @@ TEST_CASE("a plane under a directional light is evenly lit up to its border") {
 
 TEST_CASE("half of a surface sees the same light as all of it") {
   SceneBuilder b;
-  b.quad({-0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, -0.7f}, {-0.7f, 0.01f, -0.7f}, b.material(Color(0.5f)));
+  add_floor(b);
   b.data.materials.back().alpha_mode = AlphaMode::blend;
   b.data.materials.back().alpha = 0.5f;
   b.directional({0, -1, 0}, Color(1));
@@ -94,26 +92,33 @@ TEST_CASE("inside a finely divided sphere: Phi / (A (1 - rho))") {
   SceneBuilder b;
   b.sphere(Vec3(0), 0.8f, b.material(Color(0.5f), Color(1)), true, 60);
   const Estimate e(b.data, 300'000);
-  const SampleStream random(3, 0);
-  double sum = 0;
-  constexpr std::uint32_t n = 4000;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const Vec2 u = random.get2(0, i, n);
-    const float z = 1 - 2 * u.x, r = safe_sqrt(1 - z * z);
-    const Ray ray{Vec3(0), Vec3(r * std::cos(2 * kPi * u.y), r * std::sin(2 * kPi * u.y), z)};
-    const Interaction at(e.stage.scene, ray, e.stage.scene.accel().intersect(ray, 0));
-    REQUIRE(at.front);
-    sum += static_cast<double>(e.density.irradiance({at.at.p, at.at.ng, true}).x);
+  CHECK(mean_over_square([&](Vec2 u) { return e.at({Vec3(0), direction_at(u)}); }) == doctest::Approx(2 * static_cast<double>(kPi)).epsilon(0.01));
+}
+
+TEST_CASE("a small ball of many triangles gets its light, also with few photons") {
+  // In a closed box with walls of radiance 2 pi / pi = 2: the irradiance is the same everywhere.
+  SceneBuilder b;
+  b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f), Color(1)));
+  b.sphere(Vec3(0.1f, 0, 0), 0.08f, b.material(Color(0.5f), Color(1)), false, 40);
+  const double truth = 2 * static_cast<double>(kPi);
+  for (const std::uint64_t count : {20'000u, 200'000u}) {
+    CAPTURE(count);
+    const Estimate e(b.data, count);
+    std::size_t hits = 0;
+    for (const Photon& photon : e.photons.hits) hits += glm::distance(photon.position, {0.1f, 0, 0}) < 0.09f ? 1 : 0;
+    const double mean = mean_over_square([&](Vec2 u) {
+      const Vec3 d = direction_at(u);
+      return e.at({Vec3(0.1f, 0, 0) + 0.1f * d, -d});
+    });
+    CHECK(std::abs(mean / truth - 1) < 4 / std::sqrt(static_cast<double>(hits)));
   }
-  CHECK(sum / n == doctest::Approx(2 * static_cast<double>(kPi)).epsilon(0.01));
 }
 
 TEST_CASE("things that stand on a floor leave no dark rim, and twice the same floor does not halve the light") {
   for (const bool twice : {false, true}) {
     SceneBuilder b;
-    const auto floor = [&] { b.quad({-0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, -0.7f}, {-0.7f, 0.01f, -0.7f}, b.material(Color(0.5f))); };
-    floor();
-    if (twice) floor();
+    add_floor(b);
+    if (twice) add_floor(b);
     b.box({-0.2f, 0.01f, -0.2f}, {0.2f, 0.3f, 0.2f}, b.material(Color(0.5f)), false);
     b.directional({0, -1, 0}, Color(1));
     const Estimate e(b.data, 300'000, 60, PhotonKernel::cone, path_automaton<EmptyPath>());
@@ -124,9 +129,8 @@ TEST_CASE("things that stand on a floor leave no dark rim, and twice the same fl
 
 TEST_CASE("light does not leak below a thin wall") {
   SceneBuilder b;
-  b.quad({-0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, -0.7f}, {-0.7f, 0.01f, -0.7f}, b.material(Color(0.5f)));
-  b.quad({0, 0.01f, 0.7f}, {0, 0.01f, -0.7f}, {0, 0.5f, -0.7f}, {0, 0.5f, 0.7f}, b.material(Color(0)));
-  b.quad({0, 0.5f, 0.7f}, {0, 0.5f, -0.7f}, {-0.7f, 0.5f, -0.7f}, {-0.7f, 0.5f, 0.7f}, b.material(Color(0)));  // a roof over the left half
+  add_floor(b);
+  add_thin_wall(b);
   b.directional({0, -1, 0}, Color(1));
   const Estimate e(b.data, 200'000, 60, PhotonKernel::cone, path_automaton<EmptyPath>());
   CHECK(e.mean([](Vec2 u) { return Vec3(-0.001f - 0.02f * u.x, 0.01f, 0.6f * u.y - 0.3f); }, kUp) < 1e-3);

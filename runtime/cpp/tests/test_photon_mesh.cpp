@@ -2,7 +2,6 @@
 #include <doctest/doctest.h>
 
 #include <cstring>
-#include <functional>
 
 #include "ln/mesh_reduction.hpp"
 #include "ln/photon_mesh.hpp"
@@ -14,11 +13,10 @@ using namespace ln::test;
 namespace {
 
 /// The mesh of a scene's photons.
-struct Meshed {
+struct Meshed : Traced {
   explicit Meshed(const SceneData& data, std::uint64_t count, const PathAutomaton& via = path_automaton<AnyPath>(),
                   int threads = 2)
-      : stage(data, threads),
-        photons(trace_photons(stage.context, 1, stage.scene.emitters(), via, count)),
+      : Traced(data, count, via, threads),
         sorted(sort_by_surface(stage.scene.data(), photons.hits)),
         mesh(photon_mesh(stage.context, sorted, {.node = 1})) {}
 
@@ -32,31 +30,23 @@ struct Meshed {
   }
 
   /// Mean over the floor points that `place` makes of the unit square, seen from above.
-  double mean(const std::function<Vec2(Vec2)>& place, std::uint32_t n = 2000) const {
-    const SampleStream random(5, 0);
-    double sum = 0;
-    for (std::uint32_t i = 0; i < n; ++i) {
-      const Vec2 p = place(random.get2(0, i, n));
-      sum += at(mesh, {p.x, 0.9f, p.y}, {0, -1, 0});
-    }
-    return sum / n;
+  double mean(const std::function<Vec2(Vec2)>& place, float height = 0.9f) const {
+    return mean_over_square([&](Vec2 u) {
+      const Vec2 p = place(u);
+      return at(mesh, {p.x, height, p.y}, {0, -1, 0});
+    });
   }
 
-  Stage stage;
-  Photons photons;
   SortedPhotons sorted;
   TriMesh mesh;
 };
 
-void floor(SceneBuilder& b, int pieces = 1) {
-  b.quad({-0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, -0.7f}, {-0.7f, 0.01f, -0.7f}, b.material(Color(0.5f)),
-         pieces);
-}
-
-/// The integral of a mesh over all surfaces: its flux.
-double flux(const TriMesh& mesh) {
+/// The integral of a mesh over all surfaces, or some of its faces: its flux.
+double flux(
+    const TriMesh& mesh, const std::function<bool(std::uint32_t)>& counts = [](std::uint32_t) { return true; }) {
   double sum = 0;
   for (std::uint32_t face = 0; face < mesh.patches().face_count(); ++face) {
+    if (!counts(face)) continue;
     const SurfaceCell cell = mesh.patches().surface(face / 2);
     for (const MeshTriangle& t : mesh.triangles(face)) {
       const Vec2 a = t.corner[1] - t.corner[0], b = t.corner[2] - t.corner[0];
@@ -110,7 +100,7 @@ TEST_CASE("photons are sorted by the side of what goes on without a crease") {
 
 TEST_CASE("an irradiance that is linear comes out as it is, up to borders and corners") {
   SceneBuilder b;
-  floor(b);
+  add_floor(b);
   Stage stage(b.data);
   constexpr std::uint32_t kCount = 400'000;
   const Photons photons = linear_photons(stage.scene, 1, 5, kCount);
@@ -141,7 +131,7 @@ TEST_CASE("an irradiance that is linear comes out as it is, up to borders and co
 TEST_CASE("a plane under a directional light is evenly lit up to its border, in one piece or many") {
   for (const int pieces : {1, 7}) {
     SceneBuilder b;
-    floor(b, pieces);
+    add_floor(b, pieces);
     b.directional({0.3f, -1, 0.2f}, Color(3));
     const Meshed m(b.data, 400'000);
     const double truth = 3 / std::sqrt(1 + 0.09 + 0.04);
@@ -164,7 +154,7 @@ TEST_CASE("the mesh has the energy of the photons") {
 
 TEST_CASE("things that stand on a floor leave no dark rim") {
   SceneBuilder b;
-  floor(b);
+  add_floor(b);
   b.box({-0.2f, 0.01f, -0.2f}, {0.2f, 0.3f, 0.2f}, b.material(Color(0.5f)), false);
   b.directional({0, -1, 0}, Color(1));
   const Meshed m(b.data, 300'000, path_automaton<EmptyPath>());
@@ -174,9 +164,9 @@ TEST_CASE("things that stand on a floor leave no dark rim") {
 
 TEST_CASE("a surface that few photons hit has their flux over its area") {
   SceneBuilder b;
-  floor(b, 3);
+  add_floor(b, 3);
   b.directional({0, -1, 0}, Color(2));
-  const Meshed m(b.data, 300);
+  const Meshed m(b.data, 90);
   const double hit = total_flux(m.photons).x;
   CHECK(m.at(m.mesh, {0.1f, 0.5f, 0.2f}, {0, -1, 0}) == doctest::Approx(hit / (1.4 * 1.4)).epsilon(1e-4));
   CHECK(m.at(m.mesh, {0.1f, -0.5f, 0.2f}, {0, 1, 0}) == 0);
@@ -186,17 +176,37 @@ TEST_CASE("a curved surface of many triangles has no cracks and no facets") {
   SceneBuilder b;
   b.sphere(Vec3(0), 0.8f, b.material(Color(0.5f), Color(1)), true, 24);
   const Meshed m(b.data, 200'000);
-  const SampleStream random(3, 0);
-  double sum = 0;
-  constexpr std::uint32_t n = 4000;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const Vec2 u = random.get2(0, i, n);
-    const float z = 1 - 2 * u.x, r = safe_sqrt(1 - z * z);
-    const double E = m.at(m.mesh, Vec3(0), {r * std::cos(2 * kPi * u.y), r * std::sin(2 * kPi * u.y), z});
+  const double mean = mean_over_square([&](Vec2 u) {
+    const double E = m.at(m.mesh, Vec3(0), direction_at(u));
     CHECK(E > 3.5);
-    sum += E;
+    return E;
+  });
+  CHECK(mean == doctest::Approx(2 * static_cast<double>(kPi)).epsilon(0.01));
+}
+
+TEST_CASE("a small ball of many triangles gets its light") {
+  SceneBuilder b;
+  b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f), Color(1)));
+  b.sphere(Vec3(0.1f, 0, 0), 0.08f, b.material(Color(0.5f), Color(1)), false, 40);
+  for (const std::uint64_t count : {20'000u, 200'000u}) {
+    CAPTURE(count);
+    const Meshed m(b.data, count);
+    const std::uint32_t ball = m.sorted.sheet_of_triangle.back();
+    double truth = 0;
+    for (const Photon& photon : m.sorted.on(2 * ball)) truth += static_cast<double>(photon.flux.unpack().x);
+    CHECK(flux(m.mesh, [&](std::uint32_t face) { return m.sorted.surface_of_face(face) == 2 * ball; }) ==
+          doctest::Approx(truth).epsilon(0.02));
   }
-  CHECK(sum / n == doctest::Approx(2 * static_cast<double>(kPi)).epsilon(0.01));
+}
+
+TEST_CASE("light does not leak below a thin wall") {
+  SceneBuilder b;
+  add_floor(b);
+  add_thin_wall(b);
+  b.directional({0, -1, 0}, Color(1));
+  const Meshed m(b.data, 200'000, path_automaton<EmptyPath>());
+  CHECK(m.mean([](Vec2 u) { return Vec2(-0.003f - 0.02f * u.x, 0.6f * u.y - 0.3f); }, 0.4f) < 1e-3);
+  CHECK(m.mean([](Vec2 u) { return Vec2(0.003f + 0.02f * u.x, 0.6f * u.y - 0.3f); }, 0.4f) == doctest::Approx(1).epsilon(0.03));
 }
 
 TEST_CASE("any number of threads makes the same mesh") {

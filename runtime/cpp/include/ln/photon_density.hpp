@@ -21,8 +21,6 @@ class PhotonDensity {
   static constexpr int kMaxNeighbours = 4096;
 
  private:
-  float automatic_radius(PrepareContext& context) const;
-
   const PhotonMap* map_ = nullptr;
   SurfaceArea surfaces_;
   std::size_t neighbours_ = 60;

@@ -1,15 +1,14 @@
 #pragma once
 // Irradiance of all surfaces as a mesh of triangles, from sorted photons.
 
-#include "ln/sorted_photons.hpp"
+#include "ln/surface_density.hpp"
 #include "ln/tri_mesh.hpp"
 
 namespace ln {
 
 struct PhotonMeshOptions {
-  NodeId node = 0;       // on whose account rays are cast
-  int neighbours = 100;  // photons under a kernel
-  float max_radius = 0;  // no kernel is wider [normalised units]; 0: chosen from the photons of each surface
+  NodeId node = 0;  // on whose account rays are cast
+  SurfaceKernels kernels{};
   float spacing = 0.5f;  // longest edges [radii of the kernel there]
 };
 

@@ -32,7 +32,8 @@ struct SurfaceBlocker {
 struct SurfaceCoverage {
   static constexpr int kMaxBlockers = 64;
 
-  float area = 0;  // integral of the kernel over the visible surface of the neighbourhood
+  float radius = 0;  // of the kernel that was measured
+  float area = 0;    // integral of the kernel over the visible surface of the neighbourhood
   SurfaceMoments moments;  // the same by powers of the place [radii]; for the parabola only
   int blockers = 0;
   SurfaceBlocker blocker[kMaxBlockers];
@@ -48,20 +49,24 @@ class SurfaceArea {
   SurfaceArea() = default;
   SurfaceArea(PrepareContext& context, const SceneData& data);
 
-  /// Measures the surface of a neighbourhood within `radius`, of the filter's triangles. Where more than `kMaxTriangles` are that
-  /// near, the surface is taken to be a full disc.
+  /// Measures the surface of a neighbourhood within `radius`, of the filter's triangles. Where more than `kMaxTriangles` of the
+  /// neighbourhood are that near, the radius is halved until they are not.
   void measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage, TriangleFilter filter = {}) const;
 
   static constexpr int kMaxTriangles = 2048;
 
  private:
   static constexpr std::uint32_t kLeaf = 4, kWidth = 8;
-  /// Bounds of 8 neighbours in a level of the tree.
+  /// Bounds of 8 neighbours in a level of the tree: of places, and of unit normals on the front.
   struct alignas(32) Boxes {
-    float low[3][kWidth], high[3][kWidth];
+    float low[3][kWidth], high[3][kWidth], normal_low[3][kWidth], normal_high[3][kWidth];
   };
 
-  int collect(const Neighbourhood& around, float radius, std::uint32_t* found) const;
+  /// Calls `use(triangle)`, until it returns false, for all that may be of the neighbourhood, or hide parts of it, within `radius`.
+  template <class Use>
+  void for_near(const Neighbourhood& around, float radius, Use&& use) const;
+  template <PhotonKernel kernel>
+  bool measure_with(const Neighbourhood& around, float radius, TriangleFilter filter, SurfaceCoverage& coverage) const;
 
   const SceneData* data_ = nullptr;
   std::vector<std::uint32_t> triangles_;     // in order of size class and position

@@ -1,9 +1,8 @@
 #pragma once
 // Irradiance on one surface from the photons that hit it, by local linear density estimation.
 
-#include "ln/photon_map.hpp"
+#include "ln/photon_bandwidth.hpp"
 #include "ln/sorted_photons.hpp"
-#include "ln/surface_area.hpp"
 
 namespace ln {
 
@@ -14,12 +13,17 @@ struct KernelRadii {
   float mean() const { return 0.5f * (half[0] + half[1]); }
 };
 
+/// What is asked of the kernels on each surface.
+struct SurfaceKernels {
+  int least = 100, most = 1600;  // photons under the narrowest and the widest
+  float max_radius = 0;          // none is wider [normalised units]; 0: chosen from the photons
+};
+
 class SurfaceDensity {
  public:
-  /// `neighbours`: photons under a kernel, in the mean. `max_radius`: no kernel is wider [normalised units]; 0: chosen from the
-  /// photons. `area` and `sorted` must outlive the object.
+  /// `area` and `sorted` must outlive the object.
   SurfaceDensity(PrepareContext& context, const SurfaceArea& area, const SortedPhotons& sorted, std::uint32_t surface,
-                 int neighbours, float max_radius);
+                 const SurfaceKernels& kernels);
 
   /// Radii as the photons call for; infinite, if there are too few of them: then the irradiance is taken to be the same
   /// everywhere.
@@ -29,18 +33,12 @@ class SurfaceDensity {
   Color irradiance(const Neighbourhood& around, const KernelRadii& radii) const;
 
  private:
-  static constexpr std::size_t kMaxNeighbours = 4096;
-
   bool even() const { return half_[0].empty(); }
-  float distance_in(int half, const Neighbourhood& around) const;
-  Color sum(int half, const Neighbourhood& around, float radius) const;
-  float automatic_radius() const;
 
   const SurfaceArea* area_;
   TriangleFilter sheet_;
-  std::size_t neighbours_ = 0;  // in each half
-  PhotonMap half_[2];           // photons that were traced first, and the rest
-  float max_radius_ = 0;
+  KernelRange kernels_;  // in each half
+  PhotonMap half_[2];    // photons that were traced first, and the rest
   Color even_irradiance_{0};
 };
 

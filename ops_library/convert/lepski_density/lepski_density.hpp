@@ -1,0 +1,36 @@
+#pragma once
+
+#include "ln/operator.hpp"
+#include "ln/photon_bandwidth.hpp"
+
+namespace ln::ops {
+
+/// Irradiance from the density of photons, with kernels as wide as the light allows; see lepski_density.ln.
+struct LepskiDensity {
+  NodeId node;
+  std::int64_t neighbours = 800;
+  std::int64_t fewest = 20;
+  float radius = 0;  // [m]; 0: automatic
+
+  void prepare(PrepareContext& context, const PhotonMap& map) {
+    if (map.empty()) return;
+    const auto unit = static_cast<float>(context.scene().data().unit);
+    area_ = SurfaceArea(context, context.scene().data());
+    kernels_ = kernel_range(context, map, static_cast<int>(fewest), static_cast<int>(neighbours), radius / unit);
+  }
+
+  template <class Request>
+  Color answer(Request& request, const PhotonMap& map) const {
+    if constexpr (!any(Request::receives & Events::D)) return Color(0);
+    const Interaction& at = request.at();
+    if (map.empty() || !any(at.bsdf().events() & Events::D)) return Color(0);
+    const Neighbourhood around{at.at.p, at.front ? at.at.ng : -at.at.ng, at.front};
+    return request.scatter_irradiance(adaptive_local_linear(map, area_, around, kernels_).E);
+  }
+
+  // State.
+  SurfaceArea area_{};
+  KernelRange kernels_{};
+};
+
+}  // namespace ln::ops

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from lnc.library import POINTS
 from lnc.network import Input, Node, TypedNetwork
-from lnc.passes.path_automaton import first_tag_parameter, tag_value
+from lnc.passes.path_automaton import tag_value
 from lnc.syntax import ast
 
 
@@ -40,8 +40,11 @@ def _read_at(node: Node, given: Input) -> ast.TagRef | None:
     found: set[ast.TagRef | None] = set()
     for rule in node.op.paths:
         if rule.port == given.port.name:
-            parameter = first_tag_parameter(rule.tail)
-            found.add(tag_value(node, parameter) if parameter else None)
+            head = rule.tail.items[0] if isinstance(rule.tail, ast.PathConcat) else rule.tail
+            if isinstance(head, ast.PathRepeat) and head.low > 0:
+                head = head.item
+            # Not `via@from`, for `via` may be empty.
+            found.add(tag_value(node, head.tag.name) if isinstance(head, ast.PathEvents) and head.tag else None)
     return found.pop() if len(found) == 1 else None
 
 

@@ -267,8 +267,6 @@ def tag_value(node: Node, parameter: str) -> ast.TagRef | None:
 
 
 def first_tag_parameter(tail: ast.PathExpression | None) -> str | None:
-    """The parameter that says where the first event of a rule lies: `from` of `via@from` and of `(D@from)+`."""
+    """The parameter that says where the first event of a rule lies, if there is one: `from` of `via@from`."""
     head = tail.items[0] if isinstance(tail, ast.PathConcat) else tail
-    if isinstance(head, ast.PathRepeat) and head.low > 0:
-        head = head.item
-    return head.tag.name if isinstance(head, ast.PathName | ast.PathEvents) and head.tag else None
+    return head.tag.name if isinstance(head, ast.PathName) and head.tag else None

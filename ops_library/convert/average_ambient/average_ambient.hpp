@@ -1,7 +1,7 @@
 #pragma once
 
+#include "ln/ambient.hpp"
 #include "ln/operator.hpp"
-#include "ln/quad_tree.hpp"
 
 namespace ln::ops {
 
@@ -10,10 +10,7 @@ struct AverageAmbient {
   NodeId node;
   TagSelection from;
 
-  void prepare(PrepareContext& context, const QuadTree& in) {
-    const Scene& scene = context.scene();
-    mean_ = in.mean([&](std::uint32_t face) { return from(scene.part_tags(in.patches().part(face / 2))); });
-  }
+  void prepare(PrepareContext& context, const QuadTree& in) { mean_ = ambient_irradiance(context, node, in, from); }
 
   template <class Request>
   Color answer(Request& request, const QuadTree&) const {

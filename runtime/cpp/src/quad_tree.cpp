@@ -108,6 +108,17 @@ class QuadTree::Pruning {
   double energy_ = 0;  // squared norm of the function
 };
 
+std::vector<QuadTreeNode> QuadTree::face_nodes(std::uint32_t face) const {
+  std::vector<QuadTreeNode> nodes{nodes_[roots_[face]]};
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    if (nodes[i].leaf()) continue;
+    const std::uint32_t from = nodes[i].children;
+    nodes[i].children = static_cast<std::uint32_t>(nodes.size());
+    nodes.insert(nodes.end(), nodes_.begin() + from, nodes_.begin() + from + 4);
+  }
+  return nodes;
+}
+
 void QuadTree::compress(float error, std::span<const float> noise) {
   {
     Pruning pruning(*this, noise);
@@ -115,18 +126,8 @@ void QuadTree::compress(float error, std::span<const float> noise) {
   }
   // Close the gaps.
   QuadTree packed(patches_);
-  std::vector<QuadTreeNode> nodes;
-  for (std::uint32_t face = 0; face < roots_.size(); ++face) {
-    if (!lit(face)) continue;
-    nodes.assign(1, nodes_[roots_[face]]);
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      if (nodes[i].leaf()) continue;
-      const std::uint32_t from = nodes[i].children;
-      nodes[i].children = static_cast<std::uint32_t>(nodes.size());
-      nodes.insert(nodes.end(), nodes_.begin() + from, nodes_.begin() + from + 4);
-    }
-    packed.set(face, nodes);
-  }
+  for (std::uint32_t face = 0; face < roots_.size(); ++face)
+    if (lit(face)) packed.set(face, face_nodes(face));
   *this = std::move(packed);
 }
 

@@ -60,6 +60,8 @@ class QuadTree {
   /// Of a face that is lit.
   std::uint32_t root(std::uint32_t face) const { return roots_[face]; }
   const std::vector<QuadTreeNode>& nodes() const { return nodes_; }
+  /// The nodes of a face that is lit, as `set` takes them.
+  std::vector<QuadTreeNode> face_nodes(std::uint32_t face) const;
 
   /// Irradiance [W/m^2] on one side of a point of a scene's triangle (barycentric u, v).
   Color irradiance(std::uint32_t triangle, float u, float v, bool front) const {
@@ -78,20 +80,6 @@ class QuadTree {
   template <class Visit>
   void for_each_leaf(std::uint32_t face, Visit&& visit) const {
     if (lit(face)) visit_leaves(roots_[face], patches_->domain(face / 2), visit);
-  }
-
-  /// Area mean of the irradiance over the lit faces that `wanted(face)` accepts [W/m^2].
-  template <class Wanted>
-  Color mean(Wanted&& wanted) const {
-    DVec3 sum(0);
-    double whole = 0;
-    for (std::uint32_t face = 0; face < roots_.size(); ++face) {
-      if (!lit(face) || !wanted(face)) continue;
-      const auto a = static_cast<double>(area(patches_->surface(face / 2)));
-      sum += a * DVec3(nodes_[roots_[face]].value);
-      whole += a;
-    }
-    return whole > 0 ? Color(sum / whole) : Color(0);
   }
 
   /// Integral of the irradiance over all surfaces, both sides [W / unit^2].

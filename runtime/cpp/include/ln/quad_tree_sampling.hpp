@@ -20,7 +20,7 @@ using IrradianceSampler = FunctionRef<Color(Tracer&, const SampleStream&, const 
 
 /// Samples all faces of these parts that can scatter diffusely in cells of equal size, samples anew with a quarter of the size where the
 /// irradiance varies within a cell by more than `error` times the RMS irradiance of all lit cells and more than noise explains,
-/// and compresses the result. `key`: to be different for each node of a network.
+/// and compresses the result, a batch of faces at a time. `key`: to be different for each node of a network.
 QuadTree sample_quad_tree(PrepareContext& context, std::uint32_t key, const QuadTreeSampling& options,
                           IrradianceSampler sample);
 

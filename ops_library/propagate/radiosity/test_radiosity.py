@@ -22,6 +22,14 @@ def test_known_answers(runtime_tool, unit):
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.slow
+def test_known_answers_of_many_surfaces(runtime_tool):
+    tool = runtime_tool("test_radiosity")
+    done = subprocess.run([tool, "--no-skip", "--test-case=slow*"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "| 0 passed" not in done.stdout
+
+
 @pytest.mark.parametrize("scene", ["cornell_box.gltf", "closed_box.gltf"])
 def test_mean_agrees_with_path_tracing(compiled_network, run_program, scene):
     radiosity = picture(run_program, compiled_network("radiosity"), "--samples", "64", scene=scene)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <glm/common.hpp>
 
+#include "ln/emitter_shapes.hpp"
 #include "ln/error.hpp"
 #include "ln/stats.hpp"
 #include "radiosity_hierarchy.hpp"
@@ -13,11 +14,11 @@ namespace radiosity {
 
 namespace {
 
-/// Light goes from `source` to `receiver`. Between elements as source radiosity * factor * visibility, the same all over the
-/// receiver; with a cluster, faces count with their own normals as if each were at the cluster's center.
+/// Light goes from `source` to `receiver`. Between elements as radiosity * factor * visibility of each quarter of the source, the
+/// same all over the receiver; with a cluster, faces count with their own normals as if each were at the cluster's center.
 struct Link {
   NodeRef receiver, source;
-  float factor = 0;  // form factor without occlusion, between elements
+  float factor[4] = {};  // form factors of the source's quarters without occlusion, between elements
   float visibility = 0;
   std::uint32_t rays = 0;  // that have been cast for the visibility
 
@@ -35,8 +36,10 @@ constexpr float kDarkest = 1;
 /// Weight of errors from uneven sources: unlike others they have mostly the same sign, since bright places are near to each
 /// other.
 constexpr float kSourceWeight = 4;
-/// A sum of form factors, where not all that is around is surface, that is no mere noise of the visibility.
-constexpr float kImpossibleSum = 1.2f;
+/// Cells that are nearer to each other, in sums of their radii, look at each other by solid angle.
+constexpr float kNear = 3;
+/// How much the sums of form factors of a face are off by themselves, as a share.
+constexpr float kErrorOfSums = 0.03f;
 /// Sums of form factors are corrected by no more than this.
 constexpr float kLargestCorrection = 1.5f;
 
@@ -89,19 +92,27 @@ class Solver {
     const float b = brightness(link.source, link.receiver);
     const float distance = glm::distance(r.flat.cell.center(), s.flat.cell.center());
     const float error_r = b * f.spread;
-    const float error_s = kSourceWeight * f.mean * spread_[link.source] * std::min(1.0f, 2 * s.flat.radius / distance);
+    const float error_s = kSourceWeight * f.mean * quarter_spread(s) * std::min(1.0f, s.flat.radius / distance);
     if (error_r > allowed && divide_r && (error_r >= error_s || !divide_s)) return Verdict::divide_receiver;
     if (error_s > allowed && divide_s) return Verdict::divide_source;
 
-    link.factor = f.mean;
     const float carried = b * f.mean;
     const std::uint32_t rays = rays_of(carried / allowed);
     if ((divide_r || divide_s) && partly_hidden(link, rays, carried / allowed, tracer))
       return divide_r && (r.flat.area >= s.flat.area || !divide_s) ? Verdict::divide_receiver : Verdict::divide_source;
+    if (link.rays == 0)
+      for (int c = 0; c < 4; ++c) link.factor[c] = form_factor(r.flat, child(s.flat, c)).mean;
     measure_visibility(link, rays, tracer);
     // What will not be measured again may go. Other links stay, as those that seem visible by chance do.
     const bool hidden = link.visibility == 0 && link.rays >= rays_of(carried / (options_.error * mean_));
     return hidden ? Verdict::drop : Verdict::keep;
+  }
+
+  /// How much the radiosity varies within a quarter of the element.
+  float quarter_spread(const Element& e) const {
+    float spread = 0;
+    for (std::uint32_t c = e.children; c < e.children + 4 && !e.leaf(); ++c) spread = std::max(spread, spread_[c]);
+    return spread;
   }
 
   Verdict judge_clusters(Link& link, float allowed, Tracer& tracer) const {
@@ -157,20 +168,37 @@ class Solver {
   float visibility(const Link& link, std::uint32_t series, std::uint32_t rays, Tracer& tracer) const {
     constexpr std::uint32_t kFewest = 8, kOfEach = 4, kMost = kOfEach * kMostRays;
     const std::uint32_t key = hash32(link.receiver, hash32(link.source, series));
-    const float near2 = 0.25f * sqr(shape_.radius(link.source));
-    const std::uint32_t pairs =
-        link.plain() ? std::max(kFewest, kOfEach * rays) : kMost;  // in clusters many face away from each other
+    const float radius_s = shape_.radius(link.source);
+    const bool plain = link.plain();
+    const bool near = plain && glm::distance(shape_.center(link.receiver), shape_.center(link.source)) <
+                                   kNear * (radius_s + shape_.radius(link.receiver));
+    AreaLight seen;
+    if (near) {
+      const SurfaceCell& cell = shape_.elements[link.source].flat.cell;
+      seen = AreaLight(cell.o, DVec3(cell.a), DVec3(cell.b), cell.quad);
+    }
+    // In clusters many face away from each other, and very near pairs would drown the others.
+    const std::uint32_t pairs = plain ? std::max(kFewest, kOfEach * rays) : kMost;
+    const float softening = plain ? 0 : 0.25f * sqr(radius_s);
     Hierarchy::Point from[kMost], to[kMost];
     float sums[kMost];
     float sum = 0;
     for (std::uint32_t i = 0; i < pairs; ++i) {
-      const Vec2 pick = sobol_point(key, 0, i);
+      const Vec2 pick = plain ? Vec2(0) : sobol_point(key, 0, i), u = sobol_point(key, 2, i);
       from[i] = shape_.point(link.receiver, pick.x, sobol_point(key, 1, i));
-      to[i] = shape_.point(link.source, pick.y, sobol_point(key, 2, i));
+      float density = 1;  // of the direction to the source, or in proportion to that of the point on it
+      if (near) {
+        const AreaSample s = sample_solid_angle(seen, from[i].at.p, std::abs(seen.height(from[i].at.p)), u);
+        density = s.pdf_w;
+        to[i] = shape_.point(link.source, Vec2(s.s, s.t));
+      } else {
+        to[i] = shape_.point(link.source, pick.y, u);
+      }
       const Vec3 way = to[i].at.p - from[i].at.p;
       const float facing_r = glm::dot(way, from[i].normal), facing_s = -glm::dot(way, to[i].normal),
                   distance2 = glm::dot(way, way);
-      if (facing_r > 0 && facing_s > 0) sum += facing_r * facing_s / (distance2 * (distance2 + near2));
+      if (facing_r > 0 && facing_s > 0 && density > 0)
+        sum += near ? facing_r / (std::sqrt(distance2) * density) : facing_r * facing_s / (distance2 * (distance2 + softening));
       sums[i] = sum;
     }
     if (!(sum > 0)) return 0;
@@ -300,6 +328,15 @@ class Solver {
     return {towards, sum * (link.visibility * kInvPi / std::max(distance2, sqr(shape_.radius(link.source))))};
   }
 
+  /// What a link between elements brings without occlusion.
+  Color gathered(const Link& link, const std::vector<Color>& radiosity) const {
+    const Element& source = shape_.elements[link.source];
+    const float* f = link.factor;
+    if (source.leaf()) return (f[0] + f[1] + f[2] + f[3]) * radiosity[link.source];
+    const Color* quarter = &radiosity[source.children];
+    return f[0] * quarter[0] + f[1] * quarter[1] + f[2] * quarter[2] + f[3] * quarter[3];
+  }
+
   /// Irradiance on each element that `radiosity` makes, without corrections.
   std::vector<Color> transport(const std::vector<Color>& radiosity) const {
     // Links with clusters on their receiving side: once each, then by every face below.
@@ -314,7 +351,7 @@ class Solver {
       for (std::size_t l = first_of_element_[i]; l < first_of_element_[i + 1]; ++l) {
         const Link& link = links_[l];
         if (link.plain()) {
-          sum += (link.factor * link.visibility) * radiosity[link.source];
+          sum += link.visibility * gathered(link, radiosity);
         } else {
           const Flow f = flow(link, radiosity);
           sum += std::max(0.0f, glm::dot(n, f.towards)) * f.flow;
@@ -366,25 +403,46 @@ class Solver {
     return mean_;
   }
 
-  /// Where a face sees surfaces only, its form factors add up to 1; nowhere are they much more. What they are off is corrected.
+  /// Form factors of a cell add up to the share of surfaces in what it sees. Where that is 1, each cell is corrected to it;
+  /// elsewhere only whole faces are, to what rays from them have found, as far as that is known better than the sums.
   void correct_sums(RadiosityReport& report) {
-    const std::vector<Color> sums = transport(std::vector<Color>(shape_.elements.size(), Color(1)));
+    std::vector<Color> sums = transport(std::vector<Color>(shape_.elements.size(), Color(1)));
     double off = 0, whole = 0;
     for (std::size_t i = 0; i < sums.size(); ++i) {
+      const auto e = static_cast<NodeRef>(i);
       const float sum = sums[i].x;
-      const bool enclosed = shape_.faces[shape_.elements[i].face].enclosed;
-      correction_[i] = 1;
-      if (sum > 0 && (enclosed || sum > kImpossibleSum))
-        correction_[i] = std::clamp(1 / sum, 1 / kLargestCorrection, kLargestCorrection);
-      if (!shape_.elements[i].leaf() || !enclosed || !lit(static_cast<NodeRef>(i)) ||
-          !shape_.faces[shape_.elements[i].face].receives)
-        continue;
+      correction_[i] = sum > 0 ? std::clamp(1 / sum, 1 / kLargestCorrection, kLargestCorrection) : 1.0f;
+      if (!shape_.elements[i].leaf() || !face_of(e).enclosed() || !lit(e) || !shape_.receives(e)) continue;
       const auto a = static_cast<double>(shape_.elements[i].flat.area);
       off += a * std::abs(1 - static_cast<double>(sum));
       whole += a;
     }
     report.mean_correction = whole > 0 ? off / whole : 0;
+
+    // From leaves to faces. The mean of all open faces is known best.
+    for (std::size_t i = sums.size(); i-- > 0;) {
+      const Element& e = shape_.elements[i];
+      if (!e.leaf()) sums[i] = 0.25f * (sums[e.children] + sums[e.children + 1] + sums[e.children + 2] + sums[e.children + 3]);
+    }
+    double found = 0, seen = 0;
+    for (std::size_t i = 0; i < shape_.faces.size(); ++i) {
+      const Face& face = shape_.faces[i];
+      if (face.enclosed() || !face.receives) continue;
+      const auto a = static_cast<double>(shape_.elements[i].flat.area);
+      found += a * static_cast<double>(sums[i].x);
+      seen += a * static_cast<double>(face.seen());
+    }
+    const float all = found > 0 ? static_cast<float>(seen / found) : 1.0f;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      const Face& face = face_of(static_cast<NodeRef>(i));
+      if (face.enclosed()) continue;
+      const float sum = sums[shape_.elements[i].face].x, variance = (1 - face.seen()) / std::max(1.0f, static_cast<float>(face.hits));
+      const float trust = sqr(kErrorOfSums) / (sqr(kErrorOfSums) + variance);
+      const float own = sum > 0 ? face.seen() / sum / all : 1.0f;
+      correction_[i] = std::clamp(all * (1 + trust * (own - 1)), 1 / kLargestCorrection, kLargestCorrection);
+    }
   }
+  const Face& face_of(NodeRef element) const { return shape_.faces[shape_.elements[element].face]; }
 
   /// Jacobi iteration until what is still to come is less than `residual` of what is there.
   void iterate(float residual, RadiosityReport& report) {

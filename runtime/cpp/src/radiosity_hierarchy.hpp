@@ -25,9 +25,13 @@ struct Face {
   NodeRef parent = kNoNode;  // cluster
   bool receives = false;     // what arrives here is wanted, or scattered
   bool scatters = false;
-  bool enclosed = false;  // every ray from it hits something
   bool albedo_varies = false;
-  Color albedo{0};  // where it does not vary
+  Color albedo{0};         // where it does not vary
+  std::uint32_t rays = 0;  // that were cast from it
+  std::uint32_t hits = 0;  // of these; their share is what form factors add up to
+
+  bool enclosed() const { return hits == rays; }
+  float seen() const { return static_cast<float>(hits) / static_cast<float>(rays); }
 };
 
 /// A cell of a face. Elements stand behind their parents.
@@ -82,6 +86,8 @@ class Hierarchy {
     Vec3 normal;
   };
   Point point(NodeRef n, float pick, const Vec2& u) const;
+  /// The point o + st.x a + st.y b of an element's cell.
+  Point point(std::uint32_t element, const Vec2& st) const;
 
   std::vector<Face> faces;
   std::vector<Element> elements;
@@ -96,8 +102,8 @@ class Hierarchy {
   PrepareContext& context_;
   const Patches& patches_;
   float smallest_area_;
-  std::vector<std::uint8_t> enclosed_;  // by face of Patches
-  std::vector<double> area_before_;     // sum of the areas of the faces before
+  std::vector<std::uint32_t> rays_, hits_;  // by face of Patches
+  std::vector<double> area_before_;         // sum of the areas of the faces before
 };
 
 }  // namespace ln::radiosity

@@ -13,6 +13,10 @@ struct FlatCell {
   float radius = 0;  // of the ball around the center that holds the cell
 };
 FlatCell make_flat_cell(const SurfaceCell& cell, bool front);
+/// A quarter of it, see BasicCell::child.
+inline FlatCell child(const FlatCell& flat, int i) {
+  return {flat.cell.child(i), flat.normal, 0.25f * flat.area, 0.5f * flat.radius};
+}
 
 /// Form factor from the point `p` with the unit normal `n` to a source that is seen from its side of the normal: irradiance at
 /// `p` over the source's radiosity. Exact, also where the source touches the point or reaches below the horizon. Source:

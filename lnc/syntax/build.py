@@ -361,7 +361,9 @@ def _as_value(value: Any) -> ast.Value:
         return value
     if isinstance(value, ast.PathName) and value.tag is None and not value.negated:
         return ast.NameValue(value.name, value.span)
-    if isinstance(value, ast.PathEvents | ast.PathConcat) and value.span.text.isalpha():
+    if isinstance(value, ast.PathEvents) and value.tag is None and len(value.letters) == 1:
+        return ast.NameValue(value.letters, value.span)
+    if isinstance(value, ast.PathConcat) and value.span.text.isalpha():
         return ast.NameValue(value.span.text, value.span)
     return ast.PathLiteral(value, value.span)
 

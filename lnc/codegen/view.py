@@ -337,7 +337,8 @@ class _Builder:
     def carried(self, n: ScheduledNode) -> str:
         """What a wire carries: something that answers requests, or what is stored; null where neither is known."""
         if n.op.output == POINTS:
-            return f"ln::irradiance_of([this](auto& request) {{ return {self.pulls[n.identifier]}(request); }})"
+            pull = self.pulls[n.identifier]
+            return f"ln::irradiance_of<scene_events>([this](auto& request) {{ return {pull}(request); }})"
         return "nullptr" if n.op.pulled else self.accessor(n.name)
 
     # --- Caches -------------------------------------------------------------------------------------------------------

@@ -512,13 +512,14 @@ Options parse_options(int argc, const char* const* argv, const ProgramInfo& prog
   const auto unused = [&](const char* name, const std::string& value, bool used) {
     if (!used && !value.empty()) options.unused.push_back(name);
   };
-  unused("-o", raw.output, program.has_image);
-  unused("--preview", raw.preview, program.has_image);
-  unused("--size", raw.size, program.uses_camera());
-  unused("--camera", raw.camera, program.uses_camera());
-  unused("--lightmap-size", raw.lightmap_size, !program.lightmaps.empty());
   options.verify_paths = raw.verify_paths;
   if (options.verify_paths && (options.time || options.error)) throw UsageError("--verify-paths is limited by --samples only");
+  unused("-o", raw.output, program.has_image && !options.verify_paths);
+  unused("--preview", raw.preview, program.has_image && !options.verify_paths);
+  unused("--stats", raw.stats, !options.verify_paths);
+  unused("--size", raw.size, program.uses_camera());
+  unused("--camera", raw.camera, program.uses_camera());
+  unused("--lightmap-size", raw.lightmap_size, !program.lightmaps.empty() && !options.verify_paths);
   options.sets = raw.sets;
   for (const std::string& text : raw.sets) apply_set(text, program);
   return options;

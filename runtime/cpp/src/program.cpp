@@ -187,7 +187,7 @@ RenderOutcome render_picture(RunContext& context, RunCallbacks& callbacks, const
 int render_program(const Options& options, const ProgramInfo& program, RunCallbacks& callbacks, Progress& progress) {
   if (!options.print_letters && !options.verify_paths) check_files(files_of(options, program));
   for (const char* option : options.unused)
-    note(std::string(option) + " is not used: this network has nothing for it");
+    note(std::string(option) + " is not used: " + (options.verify_paths ? "--verify-paths writes no files" : "this network has nothing for it"));
 
   Workers workers(options.threads);
   Stats stats;

@@ -65,10 +65,16 @@ WireEnergy wire_energy(const EnergySampler& sampler, const Stored& stored) {
   return wire_energy(sampler, [&](Tracer&, const SampleStream&, const Hit& hit, bool front) { return stored.irradiance(hit.triangle, hit.u, hit.v, front); });
 }
 
-/// What answers the requests of a Points wire, as an IrradianceSource.
-template <class Pull>
+/// What answers the requests of a Points wire, as an IrradianceSource. `kScene` as in Request. They are of the type by which the eye
+/// asks (see run.hpp), so the compiler has nothing to instantiate anew.
+template <Events kScene, class Pull>
 auto irradiance_of(Pull pull) {
-  return [pull](Tracer& tracer, const SampleStream& random, const Hit& hit, bool front) { return sample_irradiance(tracer, random, hit, front, pull); };
+  constexpr Events kWhite = any(kScene & Events::D) ? kScene : Events::all;
+  return [pull](Tracer& tracer, const SampleStream& random, const Hit& hit, bool front) {
+    const Interaction at(tracer.scene(), hit, front, white_receiver());
+    Request<Events::DG & kWhite, kWhite, kWhite> request(tracer, random, at, Color(1), 1, RayKind::gather);
+    return kPi * pull(request);
+  };
 }
 
 // --- Comparison ------------------------------------------------------------------------------------------------------

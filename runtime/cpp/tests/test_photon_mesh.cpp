@@ -188,15 +188,12 @@ TEST_CASE("a small ball of many triangles gets its light") {
   SceneBuilder b;
   b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f), Color(1)));
   b.sphere(Vec3(0.1f, 0, 0), 0.08f, b.material(Color(0.5f), Color(1)), false, 40);
-  for (const std::uint64_t count : {20'000u, 200'000u}) {
-    CAPTURE(count);
-    const Meshed m(b.data, count);
-    const std::uint32_t ball = m.sorted.sheet_of_triangle.back();
-    double truth = 0;
-    for (const Photon& photon : m.sorted.on(2 * ball)) truth += static_cast<double>(photon.flux.unpack().x);
-    CHECK(flux(m.mesh, [&](std::uint32_t face) { return m.sorted.surface_of_face(face) == 2 * ball; }) ==
-          doctest::Approx(truth).epsilon(0.02));
-  }
+  const Meshed m(b.data, 20'000);
+  const std::uint32_t ball = m.sorted.sheet_of_triangle.back();
+  double truth = 0;
+  for (const Photon& photon : m.sorted.on(2 * ball)) truth += static_cast<double>(photon.flux.unpack().x);
+  CHECK(flux(m.mesh, [&](std::uint32_t face) { return m.sorted.surface_of_face(face) == 2 * ball; }) ==
+        doctest::Approx(truth).epsilon(0.02));
 }
 
 TEST_CASE("light does not leak below a thin wall") {

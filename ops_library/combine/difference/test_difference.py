@@ -40,6 +40,8 @@ def test_picture_tap_and_numbers(compiled_network, run_program):
     (found,) = run.stats["differences"]
     assert found["name"] == "apart"
     assert found["relMSE"] == pytest.approx(rel_mse(a, b), rel=1e-4)
+    assert found["RMSE"] == pytest.approx(np.sqrt(((a - b) ** 2).mean()), rel=1e-4)
+    assert found["mean"] == pytest.approx((a - b).mean(), rel=1e-4)
     assert found["bias"] == pytest.approx((a - b).sum() / b.sum(), rel=1e-4)
     assert found["max"] == pytest.approx(np.abs(a - b).max(), rel=1e-4)
     assert "note: apart: relMSE" in run.stderr

@@ -78,20 +78,24 @@ Color Film::signed_mean(int x, int y, int layer) const {
 
 Comparison Film::compare(int a, int b) const {
   Comparison found;
-  double difference = 0, sum = 0;
+  double sum = 0;
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       const DVec3 reference(signed_mean(x, y, b)), d = DVec3(signed_mean(x, y, a)) - reference;
       for (std::size_t i = 0; i < 3; ++i) {
         found.rel_mse += d[i] * d[i] / (reference[i] * reference[i] + 0.01);
         found.largest = std::max(found.largest, std::abs(d[i]));
-        difference += d[i];
+        found.mean += d[i];
+        found.rmse += d[i] * d[i];
         sum += reference[i];
       }
     }
   }
-  found.rel_mse /= 3.0 * static_cast<double>(pixels_.size());
-  if (sum != 0) found.bias = difference / sum;
+  if (sum != 0) found.bias = found.mean / sum;
+  const double values = 3.0 * static_cast<double>(pixels_.size());
+  found.mean /= values;
+  found.rel_mse /= values;
+  found.rmse = std::sqrt(found.rmse / values);
   return found;
 }
 

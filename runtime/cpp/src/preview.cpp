@@ -6,6 +6,7 @@
 
 #include "ln/film.hpp"
 #include "ln/output_file.hpp"
+#include "legend.hpp"
 #include "png.hpp"
 #include "srgb.hpp"
 
@@ -35,40 +36,50 @@ float compress(float luminance) {
   return luminance * (1 + luminance / (kWhite * kWhite)) / (1 + luminance);
 }
 
-/// A picture without colours of its own: from black by red and yellow to white.
+/// Of values without a colour: from black by red and yellow to white.
 Color heat(float x) { return glm::clamp(Color(3 * x, 3 * x - 1, 3 * x - 2), 0.0f, 1.0f); }
 
-/// The luminance that all but one in two hundred pixels stay below: the few beyond it are mostly noise.
-float white_of_difference(const Film& film) {
+/// The luminance that all but one in two hundred pixels stay below, since the few beyond it are mostly noise; a round number.
+double white_of_difference(const Film& film) {
   std::vector<float> all;
   for (int y = 0; y < film.height(); ++y)
     for (int x = 0; x < film.width(); ++x) all.push_back(luminance(film.mean(x, y)));
   const auto place = all.begin() + static_cast<std::ptrdiff_t>((all.size() - 1) * 199 / 200);
   std::nth_element(all.begin(), place, all.end());
-  return std::max(*place, 1e-37f);
+  return round_up(static_cast<double>(std::max(*place, 1e-37f)));
+}
+
+BytePicture tone_mapped(const Film& film) {
+  const float scale = exposure(film);
+  BytePicture picture(film.width(), film.height());
+  for (int y = 0; y < film.height(); ++y) {
+    for (int x = 0; x < film.width(); ++x) {
+      const Color c = glm::min(film.mean(x, y) * scale, Color(1e30f));
+      const float brightness = std::min(luminance(c), 1e15f);
+      const float factor = brightness > 0 ? compress(brightness) / brightness : 0;
+      for (int i = 0; i < 3; ++i) picture.at(x, y)[i] = srgb_byte(c[i] * factor);
+    }
+  }
+  return picture;
+}
+
+BytePicture difference_with_legend(const Film& film, Units units) {
+  const double white = white_of_difference(film);
+  BytePicture picture(film.width(), film.height());
+  for (int y = 0; y < film.height(); ++y) {
+    for (int x = 0; x < film.width(); ++x) {
+      const Color shown = heat(static_cast<float>(static_cast<double>(luminance(film.mean(x, y))) / white));
+      for (int i = 0; i < 3; ++i) picture.at(x, y)[i] = static_cast<unsigned char>(255 * shown[i] + 0.5f);
+    }
+  }
+  return with_legend(picture, heat, white, "|a-b|", units == Units::photometric ? "cd/m2" : "W/(m2 sr)");
 }
 
 }  // namespace
 
-void write_preview(const std::string& path, const Film& film) {
-  const bool differs = film.shows_difference();
-  const float scale = differs ? 1 / white_of_difference(film) : exposure(film);
-  std::vector<unsigned char> bytes;
-  bytes.reserve(3 * static_cast<std::size_t>(film.width()) * static_cast<std::size_t>(film.height()));
-  for (int y = 0; y < film.height(); ++y) {
-    for (int x = 0; x < film.width(); ++x) {
-      const Color c = glm::min(film.mean(x, y) * scale, Color(1e30f));
-      if (differs) {
-        const Color shown = heat(luminance(c));
-        for (std::size_t i = 0; i < 3; ++i) bytes.push_back(static_cast<unsigned char>(255 * shown[i] + 0.5f));
-        continue;
-      }
-      const float brightness = std::min(luminance(c), 1e15f);
-      const float factor = brightness > 0 ? compress(brightness) / brightness : 0;
-      for (std::size_t i = 0; i < 3; ++i) bytes.push_back(srgb_byte(c[i] * factor));
-    }
-  }
-  const std::vector<unsigned char> png = png_bytes(film.width(), film.height(), bytes);
+void write_preview(const std::string& path, const Film& film, Units units) {
+  const BytePicture picture = film.shows_difference() ? difference_with_legend(film, units) : tone_mapped(film);
+  const std::vector<unsigned char> png = png_bytes(picture.width, picture.height, picture.rgb);
   write_output_file(path, {reinterpret_cast<const char*>(png.data()), png.size()});
 }
 

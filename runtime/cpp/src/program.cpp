@@ -86,9 +86,10 @@ RenderLimits limits_of(const Options& options, double prepare_seconds) {
   return limits;
 }
 
-std::string comparison_text(const DifferenceStats& found) {
-  char text[120];
-  std::snprintf(text, sizeof text, "relMSE %.4g, bias %.3g %%, largest difference %.4g", found.rel_mse, 100 * found.bias, found.largest);
+std::string comparison_text(const Comparison& found) {
+  char text[160];
+  std::snprintf(text, sizeof text, "relMSE %.4g, RMSE %.4g, mean %.4g (bias %.3g %%), largest difference %.4g", found.rel_mse, found.rmse,
+                found.mean, 100 * found.bias, found.largest);
   return text;
 }
 
@@ -104,26 +105,29 @@ ExrMetadata metadata_of(const Options& options, const RenderOutcome& outcome, co
   std::string sets;
   for (const std::string& set : options.sets) sets += (sets.empty() ? "" : " ") + set;
   if (!sets.empty()) metadata.emplace_back("parameters", sets);
-  for (const DifferenceStats& each : stats.differences) metadata.emplace_back("difference." + each.name, comparison_text(each));
+  for (const DifferenceStats& each : stats.differences) metadata.emplace_back("difference." + each.name, comparison_text(each.found));
   return metadata;
 }
 
 /// Writes the preview; a failure is a warning while the render runs, said once.
 class Preview {
  public:
-  explicit Preview(std::string path) : path_(std::move(path)) {}
+  Preview(std::string path, Units units) : path_(std::move(path)), units_(units) {}
 
   void try_write(const Film& film) {
     try {
-      write_preview(path_, film);
+      write(film);
     } catch (const Error& error) {
       if (!warned_) warning(error.what());
       warned_ = true;
     }
   }
 
+  void write(const Film& film) const { write_preview(path_, film, units_); }
+
  private:
   std::string path_;
+  Units units_;
   bool warned_ = false;
 };
 
@@ -151,8 +155,8 @@ void report_repairs(const Film& film) {
 void compare(const Film& film, const ProgramInfo& program, Stats& stats) {
   for (const DifferenceInfo& info : program.differences) {
     const Comparison found = film.compare(info.a, info.b);
-    stats.differences.push_back({info.name, found.rel_mse, found.bias, found.largest});
-    note(std::string(info.name) + ": " + comparison_text(stats.differences.back()));
+    stats.differences.push_back({info.name, found});
+    note(std::string(info.name) + ": " + comparison_text(found));
   }
 }
 
@@ -161,7 +165,7 @@ RenderOutcome render_picture(RunContext& context, RunCallbacks& callbacks, const
   const Options& options = context.options;
   const bool has_image = context.program.has_image;
   context.progress.phase("render");
-  Preview preview(options.preview_path);
+  Preview preview(options.preview_path, options.units);
   std::function<void(const Film&)> between_passes;
   if (has_image && !options.preview_path.empty()) between_passes = [&](const Film& present) { preview.try_write(present); };
   const RenderOutcome outcome = render_passes(
@@ -180,7 +184,7 @@ RenderOutcome render_picture(RunContext& context, RunCallbacks& callbacks, const
   if (!has_image) return outcome;
   write_exr(options.output, film, context.program, metadata_of(options, outcome, context.stats), context.workers.count());
   context.stats.seconds.total = seconds_since_start();
-  if (!options.preview_path.empty()) write_preview(options.preview_path, film);
+  if (!options.preview_path.empty()) preview.write(film);
   return outcome;
 }
 

@@ -110,7 +110,12 @@ std::string stats_json(const Stats& stats) {
 
   Json differences = Json::array();
   for (const DifferenceStats& each : stats.differences)
-    differences.push_back({{"name", each.name}, {"relMSE", each.rel_mse}, {"bias", each.bias}, {"max", each.largest}});
+    differences.push_back({{"name", each.name},
+                           {"mean", each.found.mean},
+                           {"RMSE", each.found.rmse},
+                           {"relMSE", each.found.rel_mse},
+                           {"bias", each.found.bias},
+                           {"max", each.found.largest}});
 
   const Json json{{"network", stats.network},
                   {"scene", scene},

@@ -32,9 +32,11 @@ struct ErrorEstimate {
 
 /// How far two pictures are apart, over all pixels and channels.
 struct Comparison {
+  double mean = 0;     // of a - b [the picture's unit]
+  double rmse = 0;     // square root of the mean of (a - b)^2 [the picture's unit]
   double rel_mse = 0;  // mean of (a - b)^2 / (b^2 + 0.01)
   double bias = 0;     // mean(a - b) / mean(b); 0 if b is black
-  double largest = 0;  // largest |a - b|
+  double largest = 0;  // largest |a - b| [the picture's unit]
 };
 
 class Film {

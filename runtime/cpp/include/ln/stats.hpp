@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "ln/film.hpp"
+
 namespace ln {
 
 struct RayCounts {
@@ -26,10 +28,10 @@ struct NodeStats {
   std::optional<std::string> skipped;  // the reason
 };
 
-/// Two wires that were compared; see Comparison.
+/// Two wires that were compared.
 struct DifferenceStats {
   std::string name;
-  double rel_mse = 0, bias = 0, largest = 0;
+  Comparison found;
 };
 
 struct Stats {

@@ -149,6 +149,13 @@ def describe_seen(typed: TypedNetwork) -> dict[str, str]:
     return seen_paths(typed.network, typed.alphabet)
 
 
+def describe_baked(typed: TypedNetwork) -> dict[str, str]:
+    """The light paths that lightmaps show of each of their wires."""
+    from lnc.passes.light_paths import baked_paths
+
+    return baked_paths(typed.network, typed.alphabet)
+
+
 def describe_conditions(result: Result) -> dict[str, Formula]:
     """What a scene must have for operators to carry light, where that is worth a test."""
     from lnc.passes.conditions import light_conditions, skip_conditions

@@ -18,6 +18,7 @@ from lnc.driver import (
     Result,
     Unreadable,
     compile_file,
+    describe_baked,
     describe_conditions,
     describe_paths,
     describe_seen,
@@ -146,12 +147,13 @@ def write_cpp(result: Result, scene: SceneLetters | None = None) -> str:
     paths = describe_paths(result.typed)
     source = result.file.span.source.text
     light = LightView(
-        paths.image or "",
-        describe_seen(result.typed),
-        describe_wires(result.typed),
-        describe_conditions(result),
-        result.typed.alphabet,
-        scene,
+        image_paths=paths.image or "",
+        seen_paths=describe_seen(result.typed),
+        baked_paths=describe_baked(result.typed),
+        counts=describe_wires(result.typed),
+        conditions=describe_conditions(result),
+        alphabet=result.typed.alphabet,
+        scene=scene,
     )
     return write_program(program_view(result.schedule, source, light))
 

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from benchmarks import exr
 from lnc.driver import compile_network
@@ -85,7 +86,10 @@ def test_texels(compiled_network, run_program, tmp_path):
 
     atlas = exr.read(tmp_path / "floor.exr")
     assert atlas.shape == (128, 128, 3)
-    _, _, mesh = parts(tmp_path / "floor.glb")
+    model, _, mesh = parts(tmp_path / "floor.glb")
+    extras = model["asset"]["extras"]
+    assert extras["lightPaths"] == "L D E"  # as irradiance: not by G, nor in mirrors
+    assert extras["unit"] == "W/m^2" and extras["exposure"] > 0
     triangles = floor_triangles(mesh)
     assert len(triangles) == 2  # the floor is one chart
     ratios = []
@@ -162,3 +166,27 @@ def test_our_programs_show_it(compiled_network, run_program, tmp_path):
         for x in range(8):
             wanted = area_irradiance(((x - 3.5) / 2, 0.0, (y - 2.5) / 2)) * model["asset"]["extras"]["exposure"]
             np.testing.assert_allclose(picture[y, x], np.minimum(wanted, 1), rtol=0.05, atol=0.01)
+
+
+def test_others_read_it(compiled_network, run_program, tmp_path):
+    """An independent reader finds the floor in world coordinates, and on it the texture that the atlas demands."""
+    trimesh = pytest.importorskip("trimesh")
+    pytest.importorskip("PIL")
+    run_program(
+        compiled_network("baked", text=BAKED), SCENES / "plane_area.gltf", "--lightmap-size", "64", "--samples", "4"
+    )
+    scene = trimesh.load_scene(tmp_path / "floor.glb")
+    extras = (
+        scene.metadata["asset"]["extras"]
+        if "asset" in scene.metadata
+        else parts(tmp_path / "floor.glb")[0]["asset"]["extras"]
+    )
+    (front,) = (scene.to_geometry() if len(scene.geometry) == 1 else scene.dump()[:1],)
+    low, high = front.bounds
+    np.testing.assert_allclose(high[[0, 2]] - low[[0, 2]], 2 * known.PLANE_HALF_SIZE, rtol=1e-4)
+    assert ((front.visual.uv >= 0) & (front.visual.uv <= 1)).all()
+    texture = np.asarray(front.visual.material.baseColorTexture.convert("RGB")) / 255
+    wanted = np.minimum(exr.read(tmp_path / "floor.exr") * extras["exposure"], 1)
+    assert texture.shape == wanted.shape
+    encoded = np.where(wanted <= 0.0031308, 12.92 * wanted, 1.055 * wanted ** (1 / 2.4) - 0.055)
+    np.testing.assert_allclose(texture, encoded, atol=0.6 / 255)

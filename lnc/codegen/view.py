@@ -224,12 +224,14 @@ class LightView:
     """What is known of a network's light paths.
 
     `image_paths`: those of the picture; `seen_paths`: those of each wire that has a picture of its own, as the eye sees
-    it; `counts`: how often each path is, for every wire that brings light to surfaces; `conditions`: what a scene must
-    have for operators to carry light, in letters of `alphabet`; `scene`: the only one that the program is for, if so.
+    it; `baked_paths`: those that lightmaps show of their wires; `counts`: how often each path is, for every wire that
+    brings light to surfaces; `conditions`: what a scene must have for operators to carry light, in letters of
+    `alphabet`; `scene`: the only one that the program is for, if so.
     """
 
     image_paths: str
     seen_paths: dict[str, str]
+    baked_paths: dict[str, str]
     counts: Mapping[str, CountTable | None]
     conditions: dict[str, Formula]
     alphabet: Alphabet
@@ -532,10 +534,11 @@ class _Builder:
             name += "_"
         return self.layer(name, self.paths_text(terms), self.seen_terms(terms))
 
-    def paths_text(self, terms: tuple[Term, ...]) -> str:
-        """What the eye sees of a sum."""
-        paths = (_weighted(weight, self.light.seen_paths[wire]) for wire, weight in _merged(terms).items())
-        return " + ".join(paths).replace("+ -", "- ")
+    def paths_text(self, terms: tuple[Term, ...], paths: dict[str, str] | None = None) -> str:
+        """What the eye sees of a sum; or its other `paths`."""
+        by_wire = self.light.seen_paths if paths is None else paths
+        weighted = (_weighted(weight, by_wire[wire]) for wire, weight in _merged(terms).items())
+        return " + ".join(weighted).replace("+ -", "- ")
 
     def seen(self) -> tuple[SeenView, ...]:
         """The wires that results are made of, each once. A sum is made of its terms, which results may show, too."""
@@ -594,7 +597,7 @@ class _Builder:
             functor=self.lightmaps[number],
             terms=self.terms(lightmap.terms),
             wire=_sum_text(lightmap.terms),
-            light_paths=self.paths_text(lightmap.terms),
+            light_paths=self.paths_text(lightmap.terms, self.light.baked_paths),
             file=lightmap.file,
         )
 

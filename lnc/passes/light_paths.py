@@ -43,20 +43,28 @@ def light_paths(network: Network, alphabet: Alphabet) -> PathReport:
 
 
 def seen_paths(network: Network, alphabet: Alphabet) -> dict[str, str]:
-    """What the eye sees of each wire that has a picture of its own (a term of `image ... layers`, of a `tap`, a
-    `lightmap` or a `Difference`, or a `WireTap`): its paths, closed as the picture closes them, without the emitters
-    that are seen."""
-    automaton = PathAutomaton(network, alphabet)
-    renderer = Renderer(alphabet)
+    """What the eye sees of each wire that has a picture of its own (a term of `image ... layers`, of a `tap` or a
+    `Difference`, or a `WireTap`): its paths, closed as the picture closes them, without the emitters that are seen."""
     terms = [t for tap in network.taps for t in tap.terms]
-    terms += [t for lightmap in network.lightmaps for t in lightmap.terms]
     if network.image is not None and network.image.layers:
         terms += network.image.terms
     terms += [t for n in network.nodes if n.op.name == "Difference" for i in n.inputs for t in i.terms]
     shown = {t.node for t in terms} | {n.name for n in network.nodes if n.op.name == "WireTap"}
+    return _closed(network, alphabet, shown, baked=False)
+
+
+def baked_paths(network: Network, alphabet: Alphabet) -> dict[str, str]:
+    """The paths of each wire of a `lightmap`, which shows irradiance: what a surface scatters by D, seen at once."""
+    return _closed(network, alphabet, {t.node for m in network.lightmaps for t in m.terms}, baked=True)
+
+
+def _closed(network: Network, alphabet: Alphabet, wires: set[str], baked: bool) -> dict[str, str]:
+    automaton = PathAutomaton(network, alphabet)
+    renderer = Renderer(alphabet)
+    by_name = network.by_name()
     return {
-        name: _text(automaton, automaton.seen([Term(name, 1, network.by_name()[name].span)]), renderer)
-        for name in sorted(shown)
+        name: _text(automaton, automaton.seen([Term(name, 1, by_name[name].span)], baked=baked), renderer)
+        for name in sorted(wires)
     }
 
 

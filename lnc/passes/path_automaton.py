@@ -102,10 +102,14 @@ class PathAutomaton:
         self.graph.edge(specular, self.alphabet.eye, end)
         return {end} | self.seen(terms, result)
 
-    def seen(self, terms: Iterable[Term], result: str = "image") -> set[int]:
-        """Accepting states for what the eye sees of wires: scattered once as each content allows, then S* E."""
+    def seen(self, terms: Iterable[Term], result: str = "image", baked: bool = False) -> set[int]:
+        """Accepting states for what the eye sees of wires: scattered once as each content allows, then S* E.
+
+        `baked`: as irradiance on the surfaces, scattered by D and seen at once.
+        """
         specular, end = self.graph.state(), self.graph.state()
-        self.graph.edge(specular, self.alphabet.events("S"), specular)
+        if not baked:
+            self.graph.edge(specular, self.alphabet.events("S"), specular)
         self.graph.edge(specular, self.alphabet.eye, end)
         closing: dict[int, int] = {}  # events that scatter towards the eye -> a state before them
         for term in terms:
@@ -113,7 +117,8 @@ class PathAutomaton:
                 _, content, letters, _ = key
                 if content == "emission":
                     continue
-                seen = letters & self.alphabet.events("".join(e for e in SCATTERED[content] if e != "S"))
+                scattered = "".join(e for e in SCATTERED[content] if e in ("D" if baked else "DG"))
+                seen = letters & self.alphabet.events(scattered)
                 if seen not in closing:
                     closing[seen] = self.graph.state()
                     self.graph.edge(closing[seen], seen, specular)

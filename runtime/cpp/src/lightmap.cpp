@@ -112,7 +112,8 @@ void Lightmap::write(const Film& film, const char* network, const SceneData& dat
                           {"wire", info_.wire},
                           {"lightPaths", info_.light_paths},
                           {"exposure", exposure},
-                          {"colours", "irradiance * exposure, cut off at 1; " + atlas.substr(atlas.rfind('/') + 1) + " holds it uncut, in W/m^2"}});
+                          {"colours", "irradiance * exposure, cut off at 1; " + atlas.substr(atlas.rfind('/') + 1) + " holds it uncut"},
+                          {"unit", "W/m^2"}});
   const int material = writer.add_unlit_material("irradiance");
   constexpr int kLinear = 9729, kClamp = 33071;
   writer.json["images"] = {{{"bufferView", writer.add_bytes(png_bytes(side_, side_, bytes))}, {"mimeType", "image/png"}}};

@@ -18,16 +18,29 @@ import closed_forms as known  # noqa: E402
 
 NETWORK = """
 network tapped_light
+tag none = node "nowhere"
 light   = Lights()
-photons = ParticleTracer(light, count = 100k, via = ())
+photons = ParticleTracer(light, count = 50k, via = ())
+sorted  = PhotonSurfSort(photons)
 direct  = Direct(light)
-cells   = PointsToQuadTree(direct, error = 0.1%)
+cells   = PointsToQuadTree(direct, error = 0.2%)
 smooth  = QuadTreeToTriMesh(cells)
+records = IGCache(IGSampler(PathTracer(direct, via = D), samples = 256))
 tap photons -> "photons.ply"
 tap photons -> "photons.csv"
+tap sorted  -> "sorted.ply"
+tap sorted  -> "sorted.csv"
 tap cells   -> "cells.glb"
 tap smooth  -> "smooth.glb"
+tap records -> "records.ply"
+tap records -> "records.csv"
+tap ParticleTracer(light, via = S) -> "no_photons.ply"
+tap ParticleTracer(light, via = S) -> "no_photons.csv"
+tap PointsToQuadTree(Direct(light, to = none)) -> "no_cells.glb"
+expect <= L (D|G|S)* E
+image IGInterpolator(records)
 """
+SMALL = ("--size", "16x12", "--samples", "1")
 SHOW = """
 network shown
 image Direct(Lights())
@@ -35,11 +48,15 @@ image Direct(Lights())
 COLUMNS = ["x", "y", "z", "nx", "ny", "nz", "wi_x", "wi_y", "wi_z", "flux_r", "flux_g", "flux_b"]
 
 
+GRADIENTS = [f"{kind}_{channel}_{axis}" for kind in ("rotation", "translation") for channel in "rgb" for axis in "xyz"]
+RECORD_COLUMNS = [*COLUMNS[:6], "E_r", "E_g", "E_b", "radius", *GRADIENTS, "beyond"]
+
+
 def read_ply(path: Path) -> np.ndarray:
     head, _, body = path.read_bytes().partition(b"end_header\n")
     lines = head.decode("ascii").splitlines()
     assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
-    types = {"float": "<f4", "uchar": "u1"}
+    types = {"float": "<f4", "uint": "<u4", "uchar": "u1"}
     fields = [(line.split()[2], types[line.split()[1]]) for line in lines if line.startswith("property")]
     count = next(int(line.split()[2]) for line in lines if line.startswith("element vertex"))
     found = np.frombuffer(body, np.dtype(fields))
@@ -63,7 +80,7 @@ def read_glb(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, np.ndarray
         return np.frombuffer(binary, kind, a["count"] * width, view["byteOffset"]).reshape(a["count"], width)
 
     meshes = {}
-    for node in model["nodes"]:
+    for node in model.get("nodes", []):
         primitive = model["meshes"][node["mesh"]]["primitives"][0]
         mesh = {name: accessor(i) for name, i in primitive["attributes"].items()}
         world = mesh["POSITION"].astype(float) * node["scale"] + node["translation"]
@@ -80,6 +97,18 @@ def flux(mesh: dict[str, np.ndarray]) -> np.ndarray:
     return np.asarray((area[:, None] * mesh["_IRRADIANCE"][mesh["triangles"]].mean(axis=1)).sum(axis=0))
 
 
+def assert_csv(path: Path, like: np.ndarray, columns: list[str]) -> None:
+    """A table holds the numbers of a point cloud."""
+    table = np.atleast_1d(np.genfromtxt(path, delimiter=",", names=True))
+    assert list(table.dtype.names) == columns
+    for name in columns:
+        np.testing.assert_allclose(table[name], like[name], rtol=1e-6, atol=1e-7)
+
+
+def vectors(table: np.ndarray, *names: str) -> np.ndarray:
+    return np.stack([table[name].astype(float) for name in names], axis=-1)
+
+
 def floor_flux() -> np.ndarray:
     """Of the point light, through the solid angle of the floor (a rectangle cut into four at the foot of the light)."""
     x, h, z = known.POINT_POSITION
@@ -93,28 +122,23 @@ def floor_flux() -> np.ndarray:
 
 def test_files_hold_the_light(compiled_network, run_program, tmp_path):
     program = compiled_network("tapped_light", text=NETWORK)
-    run = run_program(program, SCENES / "plane_point.gltf", "--threads", "2")
+    run = run_program(program, SCENES / "plane_point.gltf", *SMALL, "--threads", "2")
     assert run.status == 0, run.stderr
-    assert not run.picture.exists()
 
     photons = read_ply(tmp_path / "photons.ply")
-    count = 100_000
+    count = 50_000
     share = len(photons) / count
     power = np.array([photons[f"flux_{c}"].sum(dtype=float) for c in "rgb"])
     noise = math.sqrt((1 - share) / share / count)
     np.testing.assert_allclose(power, floor_flux(), rtol=4 * noise)
     np.testing.assert_allclose(photons["ny"], 1, atol=1e-3)
     # Photons come straight from the lamp.
-    position = np.stack([photons[c] for c in "xyz"], axis=-1)
-    wi = np.stack([photons[f"wi_{c}"] for c in "xyz"], axis=-1)
-    towards = np.array(known.POINT_POSITION) - position
+    wi = vectors(photons, "wi_x", "wi_y", "wi_z")
+    towards = np.array(known.POINT_POSITION) - vectors(photons, "x", "y", "z")
     np.testing.assert_allclose(wi, towards / np.linalg.norm(towards, axis=1)[:, None], atol=2e-4)
     assert 120 < photons["red"].mean() < 255
 
-    table = np.genfromtxt(tmp_path / "photons.csv", delimiter=",", names=True)
-    assert list(table.dtype.names) == COLUMNS
-    for name in COLUMNS:
-        np.testing.assert_allclose(table[name], photons[name], rtol=1e-6, atol=1e-7)
+    assert_csv(tmp_path / "photons.csv", photons, COLUMNS)
 
     for name in ("cells", "smooth"):
         model, meshes = read_glb(tmp_path / f"{name}.glb")
@@ -128,14 +152,68 @@ def test_files_hold_the_light(compiled_network, run_program, tmp_path):
         np.testing.assert_allclose(mesh["corners"][..., 1], 0, atol=1e-5)
 
     before = {path.name: path.read_bytes() for path in tmp_path.glob("*.[pcg]*") if path.suffix != ".exr"}
-    run_program(program, SCENES / "plane_point.gltf", "--threads", "1")
+    assert len(before) == 11
+    run_program(program, SCENES / "plane_point.gltf", *SMALL, "--threads", "1")
     for name, content in before.items():
         assert (tmp_path / name).read_bytes() == content, name
+
+    # What carries no light gives empty files.
+    assert len(read_ply(tmp_path / "no_photons.ply")) == 0
+    assert (tmp_path / "no_photons.csv").read_text() == ",".join(COLUMNS) + "\n"
+    assert "no_cells.glb: nothing on this wire is lit" in run.stderr
+    assert not read_glb(tmp_path / "no_cells.glb")[1]
+
+
+def test_sorted_photons(compiled_network, run_program, tmp_path):
+    """The same photons, surface by surface; in a room of flat walls, each has one normal and one plane."""
+    program = compiled_network("tapped_light", text=NETWORK)
+    run = run_program(program, SCENES / "closed_box.gltf", *SMALL)
+    assert run.status == 0, run.stderr
+    photons, found = read_ply(tmp_path / "photons.ply"), read_ply(tmp_path / "sorted.ply")
+    assert_csv(tmp_path / "sorted.csv", found, [*COLUMNS, "surface"])
+    for name in COLUMNS:
+        np.testing.assert_array_equal(np.sort(found[name]), np.sort(photons[name]))
+    assert (np.diff(found["surface"].astype(int)) >= 0).all()
+    planes = []
+    for surface in np.unique(found["surface"]):
+        own = found[found["surface"] == surface]
+        normal = vectors(own, "nx", "ny", "nz")
+        height = (vectors(own, "x", "y", "z") * normal).sum(axis=1)
+        np.testing.assert_allclose(normal - normal[0], 0, atol=1e-6)
+        np.testing.assert_allclose(height, height[0], atol=1e-3)
+        planes.append((*np.round(normal[0], 2), round(float(height[0]), 2)))
+    assert len(set(planes)) == len(planes) == 5  # all that the lamp shines on: walls and floor
+
+
+def test_irradiance_records(compiled_network, run_program, tmp_path):
+    """Of one reflection: pi albedo in a closed room that shines; elsewhere gradients foretell what neighbours found."""
+    program = compiled_network("tapped_light", text=NETWORK)
+    run = run_program(program, SCENES / "furnace.gltf", *SMALL)
+    assert run.status == 0, run.stderr
+    records = read_ply(tmp_path / "records.ply")
+    assert_csv(tmp_path / "records.csv", records, RECORD_COLUMNS)
+    assert len(records) > 5 and not records["beyond"].any()
+    found = vectors(records, "E_r", "E_g", "E_b")[:, 0]
+    assert abs(found.mean() - 0.5 * math.pi) < 4 * found.std() / math.sqrt(len(found)) < 0.01
+
+    run_program(program, SCENES / "closed_box.gltf", "--size", "64x48", "--samples", "1")
+    records = read_ply(tmp_path / "records.ply")
+    place, normal = vectors(records, "x", "y", "z"), vectors(records, "nx", "ny", "nz")
+    irradiance = vectors(records, "E_r", "E_g", "E_b")
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1, atol=1e-5)
+    slope = vectors(records, *GRADIENTS[9:]).reshape(-1, 3, 3)
+    offset = place[None, :] - place[:, None]  # from i to j
+    near = (normal @ normal.T > 0.99) & (np.linalg.norm(offset, axis=2) < 3 * records["radius"][:, None])
+    i, j = np.nonzero(near & ~np.eye(len(records), dtype=bool))
+    assert len(i) > 100
+    change = irradiance[j] - irradiance[i]
+    foretold = np.einsum("kcx,kx->kc", slope[i], offset[i, j])
+    assert ((change - foretold) ** 2).mean() < 0.4 * (change**2).mean()
 
 
 def test_our_programs_render_what_is_written(compiled_network, run_program, tmp_path):
     """Seen straight from the front, a cell has its colour."""
-    run_program(compiled_network("tapped_light", text=NETWORK), SCENES / "plane_point.gltf")
+    run_program(compiled_network("tapped_light", text=NETWORK), SCENES / "plane_point.gltf", *SMALL)
     data = (tmp_path / "smooth.glb").read_bytes()
     size = int.from_bytes(data[12:16], "little")
     model = json.loads(data[20 : 20 + size])
@@ -159,15 +237,3 @@ def test_our_programs_render_what_is_written(compiled_network, run_program, tmp_
             wanted = known.point_irradiance(known.POINT_POSITION, known.POINT_INTENSITY, place)
             colour = np.minimum(wanted * np.array(known.POINT_COLOR) * exposure, 1)
             np.testing.assert_allclose(picture[y, x], colour, rtol=0.06)
-
-
-def test_no_light_gives_an_empty_file(compiled_network, run_program, tmp_path):
-    text = NETWORK.replace("tapped_light", "dark").replace("via = ()", "via = S")
-    text = text.replace("direct  = Direct(light)", 'tag none = node "nowhere"\ndirect  = Direct(light, to = none)')
-    run = run_program(compiled_network("dark", text=text), SCENES / "plane_point.gltf")
-    assert run.status == 0, run.stderr
-    assert len(read_ply(tmp_path / "photons.ply")) == 0
-    assert (tmp_path / "photons.csv").read_text() == ",".join(COLUMNS) + "\n"
-    assert "cells.glb: nothing on this wire is lit" in run.stderr
-    shown = run_program(compiled_network("shown", text=SHOW), tmp_path / "cells.glb", "--size", "4x3")
-    assert shown.status == 0, shown.stderr

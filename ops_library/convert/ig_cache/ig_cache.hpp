@@ -1,5 +1,7 @@
 #pragma once
 
+#include <limits>
+
 #include "ln/hemisphere_request.hpp"
 #include "ln/operator.hpp"
 
@@ -28,24 +30,32 @@ struct IGCache {
       static_cast<std::vector<Receiver>*>(recursion.purpose)->push_back({at.hit, at.front, at.at.p, at.frame.n, 0});
       return;
     }
-    // What lies between the pixels that were looked at before the picture may be farther from a record than is allowed.
-    const IrradianceRecords& records = recursion.depth > 0 ? beyond_ : seen_;
-    for (const float limit : {IrradianceRecords::kOverlap, IrradianceRecords::kFar})
-      if (records.visit(at.at.p, at.frame.n, limit, request.visit)) return;
+    const auto read = [&](const IrradianceRecords& records, float limit) { return records.visit(at.at.p, at.frame.n, limit, request.visit); };
     if (recursion.depth > 0) {
-      if (!beyond_.empty()) request.visit(ambient_, 1);
+      float cover = read(beyond_, IrradianceRecords::kOverlap);
+      if (cover <= IrradianceRecords::kEnough) cover += read(beyond_, IrradianceRecords::kFar);
+      if (cover == 0 && !beyond_.empty()) request.visit(ambient_, 1);
       return;
     }
+    // What lies between the places that were looked at before, or in a gap, may be farther from records than is allowed.
+    if (read(seen_, IrradianceRecords::kOverlap) > IrradianceRecords::kEnough) return;
     const std::uint32_t key = hash32(request.random().bits(request.depth(), kRoulette));
     const Receiver where{at.hit, at.front, at.at.p, at.frame.n};
-    request.visit(IrradianceRecord{where.p, where.n, 0, 0, sample(request.tracer(), where, key, 1, samples)}, 1);
+    request.visit(IrradianceRecord{where.p, where.n, 0, 0, sample(request.tracer(), where, key, kSpotShare, samples)}, 1);
   }
+
+  /// The records, for taps.
+  IrradianceRecordSets irradiance_records() const { return {seen_, beyond_}; }
 
  private:
   // Records that the eye does not see: wider apart, less exact, made from fewer directions.
-  static constexpr float kCoarser = 4, kCoarserError = 2, kBeyondShare = 0.25f;
-  // Where they are wanted is found from about so many pixels, then from the records found so far.
-  static constexpr float kProbes = 1024, kProbeShare = 1.0f / 32;
+  static constexpr float kCoarser = 4, kCoarserError = 1, kBeyondShare = 0.25f;
+  static constexpr float kSpotShare = 0.125f;  // of the directions, where something is sampled on the spot for a single request
+  // Where they are wanted is found from about so many pixels, of places where others measure, and on all surfaces, then from the
+  // records found so far.
+  static constexpr std::size_t kProbes = 1024;
+  static constexpr float kProbeShare = 1.0f / 32;
+  static constexpr std::uint32_t kSpread = 64;
   static constexpr int kGenerations = 4;
   static constexpr int kWidestStride = 16;  // [pixels]
 
@@ -65,10 +75,11 @@ struct IGCache {
   /// Places where this node is asked for light, when it makes samples at `origins` (few directions each). Answered by darkness.
   std::vector<Receiver> asked_from(PrepareContext& context, const std::vector<Receiver>& origins, const auto& samples) const {
     std::vector<std::vector<Receiver>> wanted(origins.size());
+    const float largest = scene_size(context.scene().data());
     context.for_chunks(origins.size(), 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
       for (std::size_t i = begin; i < end; ++i) {
         sample(tracer, origins[i], hash32(key_, static_cast<std::uint32_t>(i)), kProbeShare, samples, &wanted[i]);
-        for (Receiver& place : wanted[i]) place.footprint = origins[i].footprint + context.view().rays.height_at(place.hit.t);
+        for (Receiver& place : wanted[i]) place.footprint = std::min(origins[i].footprint + context.view().rays.height_at(place.hit.t), largest);
       }
     });
     std::vector<Receiver> all;
@@ -80,17 +91,19 @@ struct IGCache {
   /// follows the same directions, so rounds differ by the light of one more bounce only.
   void solve_beyond(PrepareContext& context, const auto& samples) {
     const View& view = context.view();
-    const int stride = 1 + static_cast<int>(std::sqrt(static_cast<float>(view.width) * static_cast<float>(view.height) / kProbes));
-    std::vector<Receiver> origins = seen_receivers(
+    const int stride = 1 + static_cast<int>(std::sqrt(static_cast<float>(view.width) * static_cast<float>(view.height) / static_cast<float>(kProbes)));
+    const std::vector<Receiver> seen = seen_receivers(
         context, node, [&](int x, int y) { return x % stride == 0 && y % stride == 0; }, [](const Receiver&) { return true; });
     std::vector<Receiver> places;
-    for (int generation = 0; generation < kGenerations && !origins.empty(); ++generation) {
-      origins = cover(context, beyond_, asked_from(context, origins, samples), key_,
-                      [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
-                        std::vector<Receiver> ignored;
-                        return sample(tracer, where, key, kBeyondShare, samples, &ignored);
-                      });
-      places.insert(places.end(), origins.begin(), origins.end());
+    for (std::vector<Receiver> origins : {seen, measured_receivers(context, kProbes), spread_receivers(context, kSpread)}) {
+      for (int generation = 0; generation < kGenerations && !origins.empty(); ++generation) {
+        origins = cover(context, beyond_, asked_from(context, origins, samples), key_,
+                        [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
+                          std::vector<Receiver> ignored;
+                          return sample(tracer, where, key, kBeyondShare, samples, &ignored);
+                        });
+        places.insert(places.end(), origins.begin(), origins.end());
+      }
     }
     BounceSeries series(beyond_);
     const auto with_bounces_so_far = [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
@@ -101,17 +114,17 @@ struct IGCache {
     ambient_.sample.irradiance = beyond_.mean_irradiance();
   }
 
-  /// Records where the eye sees surfaces, from a wide grid of pixels to all of them.
+  /// Records where the eye sees surfaces, from a wide grid of pixels to all of them, and where probes and lightmaps measure.
   void cover_seen(PrepareContext& context, const auto& samples) {
+    const auto exactly = [&](Tracer& tracer, const Receiver& where, std::uint32_t key) { return sample(tracer, where, key, 1, samples); };
     for (int stride = kWidestStride; stride > 0; stride /= 2) {
       const auto on_grid = [](int x, int y, int width) { return x % width == 0 && y % width == 0; };
       std::vector<Receiver> wanted = seen_receivers(
           context, node, [&](int x, int y) { return on_grid(x, y, stride) && (stride == kWidestStride || !on_grid(x, y, 2 * stride)); },
           [&](const Receiver& r) { return !seen_.covers(r.p, r.n); });
-      cover(context, seen_, std::move(wanted), key_ + 1, [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
-        return sample(tracer, where, key, 1, samples);
-      });
+      cover(context, seen_, wanted, key_ + 1, exactly);
     }
+    cover(context, seen_, measured_receivers(context, std::numeric_limits<std::size_t>::max()), key_ + 1, exactly);
   }
 
  public:

@@ -57,6 +57,7 @@ IrradianceSample integrate(const HemisphereGrid& grid, std::span<const Hemispher
       const HemisphereCell& here = cell(j, k);
       sum += here.radiance;
       inverse_distance += 1 / std::max(here.distance, 1e-6f);
+      result.nearest = std::min(result.nearest, here.distance);
       tilt += here.radiance * ring_of[j].tilt;
       // A border between two cells belongs to the nearer surface, and moves as that one does (Ward and Heckbert 1992, eq. 2).
       if (j > 0) {

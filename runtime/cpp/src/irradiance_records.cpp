@@ -2,7 +2,10 @@
 
 #include <numeric>
 
-#include "ln/request.hpp"
+#include "ln/diffuse_surface.hpp"
+#include "ln/distribution.hpp"
+#include "ln/patches.hpp"
+#include "ln/receiver.hpp"
 
 namespace ln {
 
@@ -27,6 +30,12 @@ IrradianceSample combined(const IrradianceSample& a, const Color& factor, const 
   return sum;
 }
 
+/// A receiver that is not seen in a picture.
+Receiver receiver_on(const Scene& scene, const Hit& hit, bool front, float footprint) {
+  const Interaction at(scene, hit, front, white_receiver());
+  return {hit, front, at.at.p, at.frame.n, footprint};
+}
+
 /// Random numbers of record `index`.
 std::uint32_t record_key(std::uint32_t key, std::size_t index) { return hash32(key, static_cast<std::uint32_t>(index)); }
 
@@ -39,6 +48,8 @@ void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sampl
   const Color E = sample.irradiance;
   const float slope = glm::length(sample.translation * Vec3(1)), sum = E.x + E.y + E.z;
   float distance = std::min(sample.distance, slope > 0 ? sum / slope : kInfinity);
+  // No record reaches past the edge of what it sees: there may be a gap behind.
+  distance = std::min(distance, sample.nearest / spacing_.error);
   for_near(record.p, [&](const IrradianceRecord& near) {
     if (glm::dot(near.n, record.n) > 0.5f) distance = std::min(distance, near.sample.distance + glm::distance(near.p, record.p));
     return false;
@@ -82,11 +93,10 @@ Color IrradianceRecords::mean_irradiance() const {
 }
 
 bool IrradianceRecords::covers(const Vec3& p, const Vec3& n) const {
-  constexpr float kEnough = 0.1f;  // one record suffices, unless it is far out of its depth, as those in narrow gaps are
   float sum = 0;
   for_near(p, [&](const IrradianceRecord& record) {
     const float e = error(record, p, n);
-    if (e < 1) sum += weight(record, p, e, kOverlap);
+    if (e < 1) sum += cover_by(record, p, e, kOverlap);
     return sum > kEnough;
   });
   return sum > kEnough;
@@ -214,6 +224,42 @@ std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, Funct
   std::vector<Receiver> all;
   for (const auto& row : rows) all.insert(all.end(), row.begin(), row.end());
   return all;
+}
+
+float scene_size(const SceneData& data) {
+  Vec3 low(kInfinity), high(-kInfinity);
+  for (const Vec3& p : data.positions) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  return data.positions.empty() ? 2.0f : max_component(high - low);
+}
+
+std::vector<Receiver> measured_receivers(PrepareContext& context, std::size_t most) {
+  const float size = scene_size(context.scene().data());
+  const std::vector<MeasuredPlace> places = context.view().measured();
+  std::vector<Receiver> found;
+  for (std::size_t i = 0; i < places.size(); i += 1 + places.size() / most)
+    found.push_back(receiver_on(context.scene(), places[i].hit, places[i].front, size));
+  return found;
+}
+
+std::vector<Receiver> spread_receivers(PrepareContext& context, std::uint32_t count) {
+  const Scene& scene = context.scene();
+  const Patches patches(scene.data());
+  std::vector<double> areas(patches.face_count());
+  for (std::uint32_t face = 0; face < patches.face_count(); ++face)
+    if (scatters_diffusely(scene, patches.part(face / 2), Patches::is_front(face))) areas[face] = static_cast<double>(area(patches.surface(face / 2)));
+  const Distribution by_area(areas);
+  const float size = scene_size(scene.data());
+  std::vector<Receiver> found;
+  for (std::uint32_t i = 0; i < count && !by_area.empty(); ++i) {
+    const SampleStream random(hash32(static_cast<std::uint32_t>(context.seed()), count), i);
+    const std::uint32_t face = by_area.sample((static_cast<float>(i) + random.get1(0, kRoulette)) / static_cast<float>(count)).index;
+    const Hit hit = patches.hit(face / 2, patches.domain(face / 2).point(random.get2(0, kOwn)));
+    found.push_back(receiver_on(scene, hit, Patches::is_front(face), size));
+  }
+  return found;
 }
 
 }  // namespace ln

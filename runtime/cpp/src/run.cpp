@@ -167,9 +167,20 @@ void NetworkRun::build(RunContext& context) {
   }
   skip_dark_nodes(context.options.verify_paths);
   seed_hash_ = hash32(static_cast<std::uint32_t>(context.options.seed), static_cast<std::uint32_t>(context.options.seed >> 32));
-  prepare_context_.emplace(*scene_, context.workers, context.options.seed, program_.nodes.size(), View{camera_, size_.width, size_.height});
   prepare_seconds_.assign(program_.nodes.size(), 0);
   for (int i = 0; i < context.workers.count(); ++i) tracers_.emplace_back(*scene_, program_.nodes.size(), program_.layers.size());
+  for (Probe& probe : probes_) probe.place(tracer(0));
+  for (Lightmap& lightmap : lightmaps_) lightmap.lay_out(scene_->data(), context.options.lightmap_side);
+  const View view{camera_, size_.width, size_.height, [this] { return measured_places(); }};
+  prepare_context_.emplace(*scene_, context.workers, context.options.seed, program_.nodes.size(), view);
+}
+
+std::vector<MeasuredPlace> NetworkRun::measured_places() const {
+  constexpr std::size_t kMostTexels = 1 << 17;  // of a lightmap
+  std::vector<MeasuredPlace> places;
+  for (const Probe& probe : probes_) probe.add_places(*scene_, places);
+  for (const Lightmap& lightmap : lightmaps_) lightmap.add_places(kMostTexels, places);
+  return places;
 }
 
 void NetworkRun::skip_dark_nodes(bool verifies) {
@@ -202,9 +213,6 @@ RenderOutcome NetworkRun::measure(RunContext& context, const RenderLimits& limit
     const bool is_probe = i < probes_.size();
     const std::size_t map = i - probes_.size();
     context.progress.phase("render", is_probe ? program_.probes[i].file : program_.lightmaps[map].file);
-    if (is_probe) probes_[i].place(tracer(0));
-    else lightmaps_[map].lay_out(scene_->data(), context.options.lightmap_side);
-
     RenderLimits own = limits;
     if (is_probe && context.options.default_samples) own.samples = kDefaultProbeSamples;
     // What follows gets its share of the time.

@@ -52,14 +52,17 @@ TEST_CASE("the octree finds the records that a search of all finds") {
   int found_some = 0;
   for (std::uint32_t i = 0; i < 500; ++i) {
     const Vec3 p = somewhere(1000 + i), n(0, 1, 0);
-    float expected = 0, found = 0;
+    float expected = 0, trust = 0, found = 0;
     for (const IrradianceRecord& record : records.records()) {
       const Vec3 d = p - record.p;
       const float e = std::sqrt(glm::dot(d, d) + sqr(4 * d.y)) / record.reach;
-      if (e < 1.4f) expected += (1 - e / 1.4f) * std::min(1.0f, record.exact / glm::length(d));
+      const float depth = std::min(1.0f, record.exact / glm::length(d));
+      if (e < 1.4f) expected += std::pow(1 - e / 1.4f, 3.0f) * depth;
+      if (e < 1.4f) trust += (1 - e / 1.4f) * depth;
     }
-    records.visit(p, n, 1.4f, [&](const IrradianceRecord&, float w) { found += w; });
+    const float cover = records.visit(p, n, 1.4f, [&](const IrradianceRecord&, float w) { found += w; });
     CHECK(found == doctest::Approx(expected).epsilon(1e-4));
+    CHECK(cover == doctest::Approx(trust).epsilon(1e-4));
     found_some += found > 0;
   }
   CHECK(found_some > 100);
@@ -109,6 +112,40 @@ TEST_CASE("a dark record in a gap, used farther away than it should be, gives wa
   };
   CHECK(irradiance(Vec3(0)) < 0.2f);
   CHECK(irradiance(Vec3(0.012f, 0, 0)) > 0.9f);
+}
+
+TEST_CASE("a dark record in a gap, alone and far out of its depth, is no cover") {
+  IrradianceRecords records(RecordSpacing{0.2f, 0.02f, 0.3f});
+  records.add(receiver(Vec3(0)), seen(1e-3f, 0));
+  const auto cover = [&](const Vec3& p) { return records.visit(p, Vec3(0, 1, 0), IrradianceRecords::kOverlap, [](const IrradianceRecord&, float) {}); };
+  CHECK(cover(Vec3(0)) > IrradianceRecords::kEnough);
+  CHECK(cover(Vec3(0.015f, 0, 0)) > 0);
+  CHECK(cover(Vec3(0.015f, 0, 0)) < IrradianceRecords::kEnough);
+  CHECK_FALSE(records.covers(Vec3(0.015f, 0, 0), Vec3(0, 1, 0)));
+}
+
+TEST_CASE("records where irradiance is curved, as towards corners, hardly brighten it") {
+  // E = 1 - x^2 / 2, with exact gradients: each record's tangent lies above it.
+  const auto E = [](float x) { return 1 - 0.5f * x * x; };
+  IrradianceRecords records(RecordSpacing{0.2f, 0.02f, 0.3f});
+  for (int i = -6; i <= 6; ++i) {
+    const float x = 0.15f * static_cast<float>(i);
+    IrradianceSample sample = seen(1, E(x));
+    for (int c = 0; c < 3; ++c) sample.translation[c] = Vec3(-x, 0, 0);
+    records.add(receiver(Vec3(x, 0, 0)), sample);
+  }
+  double bias = 0;
+  for (int i = 0; i < 100; ++i) {
+    const Vec3 p(-0.5f + 0.01f * static_cast<float>(i), 0, 0);
+    float sum = 0, weight = 0;
+    records.visit(p, Vec3(0, 1, 0), IrradianceRecords::kOverlap, [&](const IrradianceRecord& record, float w) {
+      sum += w * record.at(p, Vec3(0, 1, 0)).x;
+      weight += w;
+    });
+    bias += static_cast<double>(sum / weight - E(p.x)) / 100;
+  }
+  CHECK(bias > 0);
+  CHECK(bias < 0.004);
 }
 
 TEST_CASE("covering: all places are covered, sparsely, the same for any number of threads") {

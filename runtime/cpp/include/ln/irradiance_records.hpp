@@ -10,6 +10,8 @@
 
 namespace ln {
 
+struct TapFile;
+
 /// A place where irradiance is wanted: one side of the surface at `hit`.
 struct Receiver {
   Hit hit;
@@ -57,24 +59,27 @@ class IrradianceRecords {
   /// Do the records whose error at the point is allowed weigh enough?
   bool covers(const Vec3& p, const Vec3& n) const;
 
-  /// Calls `visit(record, weight)` for records near the point, weights falling linearly to 0 with the error (Tabellion and
-  /// Lamorlette 2004). `limit` <= kFar: the error at which they get there, in units of what is allowed. A record that is used
-  /// farther away than it should be, as records in corners and gaps are, gives way to others. False: there are none.
+  /// Calls `visit(record, weight)` for records near the point. Weights fall to 0 with the error, like Tabellion and Lamorlette's
+  /// (2004), but with its third power: where irradiance is curved, gradients lead astray with the square of the distance. `limit` <=
+  /// kFar: the error at which they get to 0, in units of what is allowed. A record that is used farther away than it should be, as
+  /// records in corners and gaps are, gives way to others. Returns how well the point is covered: enough, or not.
   template <class Visit>
-  bool visit(const Vec3& p, const Vec3& n, float limit, Visit&& visit) const {
-    bool any = false;
+  float visit(const Vec3& p, const Vec3& n, float limit, Visit&& visit) const {
+    float sum = 0;
     for_near(p, [&](const IrradianceRecord& record) {
       const float e = error(record, p, n);
       if (e >= limit) return false;
-      visit(record, weight(record, p, e, limit));
-      any = true;
+      const float trust = cover_by(record, p, e, limit);
+      visit(record, sqr(1 - e / limit) * trust);
+      sum += trust;
       return false;
     });
-    return any;
+    return sum;
   }
 
   static constexpr float kOverlap = 1.4f;  // usual limit: neighbouring records overlap, so that no border shows
   static constexpr float kFar = 3.0f;
+  static constexpr float kEnough = 0.1f;  // cover: one record suffices, unless it is far out of its depth, as those in narrow gaps are
 
  private:
   struct Node {
@@ -95,7 +100,7 @@ class IrradianceRecords {
     return std::sqrt(glm::dot(d, d) + off * off) / record.reach + turned / spacing_.error;
   }
 
-  static float weight(const IrradianceRecord& record, const Vec3& p, float e, float limit) {
+  static float cover_by(const IrradianceRecord& record, const Vec3& p, float e, float limit) {
     return (1 - e / limit) * record.exact / std::max(record.exact, glm::distance(p, record.p));
   }
 
@@ -122,6 +127,14 @@ class IrradianceRecords {
   std::vector<Node> nodes_;
   std::vector<Entry> entries_;
 };
+
+/// The records of a wire: where the eye sees surfaces, and coarser ones where it does not but the records get their light from.
+struct IrradianceRecordSets {
+  const IrradianceRecords& seen;
+  const IrradianceRecords& beyond;
+};
+
+void write_tap(const TapFile& tap, const IrradianceRecordSets& sets);
 
 /// Makes a record's sample: the receiver and a key for its random numbers.
 using SampleIrradiance = FunctionRef<IrradianceSample(Tracer&, const Receiver&, std::uint32_t key)>;
@@ -155,5 +168,15 @@ class BounceSeries {
 /// order of pixels. Camera rays at the cost of `node`.
 std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, FunctionRef<bool(int x, int y)> choose,
                                      FunctionRef<bool(const Receiver&)> keep);
+
+/// Longest side of the scene's bounding box [normalised units].
+float scene_size(const SceneData& data);
+
+/// The places on surfaces where probes and lightmaps measure, evenly thinned out where they are more than `most`. There is no
+/// picture there: the whole scene counts as one.
+std::vector<Receiver> measured_receivers(PrepareContext& context, std::size_t most);
+
+/// About `count` places spread evenly over all surfaces that scatter diffusely, for what nobody has announced.
+std::vector<Receiver> spread_receivers(PrepareContext& context, std::uint32_t count);
 
 }  // namespace ln

@@ -10,6 +10,7 @@
 #include "ln/film.hpp"
 #include "ln/parallel.hpp"
 #include "ln/patches.hpp"
+#include "ln/prepare.hpp"
 #include "ln/program.hpp"
 #include "ln/receiver.hpp"
 #include "ln/render_passes.hpp"
@@ -24,6 +25,18 @@ class Lightmap {
   void lay_out(const SceneData& data, int side);
 
   int side() const { return side_; }
+
+  /// Adds a place in each texel, evenly thinned out where they are more than `most`.
+  void add_places(std::size_t most, std::vector<MeasuredPlace>& places) const {
+    constexpr float kInside = 0.25f;  // of the texel: centres lie on the borders of patches, where rays may pass between walls
+    const std::size_t step = 1 + texels_.size() / most;
+    for (std::size_t i = 0; i < texels_.size(); i += step) {
+      if (texels_[i] == kNone) continue;
+      const Chart& chart = charts_[texels_[i]];
+      const auto width = static_cast<std::size_t>(side_);
+      places.push_back({hit(chart, static_cast<int>(i % width), static_cast<int>(i / width), Vec2(kInside)), Patches::is_front(chart.face)});
+    }
+  }
 
   /// Adds the tile's samples of its texels.
   template <class Wire>
@@ -63,11 +76,15 @@ class Lightmap {
 
   template <class Wire>
   LN_INLINE Color sample(const Chart& chart, int x, int y, Tracer& tracer, const SampleStream& random, const Wire& wire) const {
-    const Vec2 u = random.get2(0, kOwn);
+    return sample_irradiance(tracer, random, hit(chart, x, y, random.get2(0, kOwn)), Patches::is_front(chart.face), wire);
+  }
+
+  /// The point of a texel that `u` of the unit square chooses.
+  Hit hit(const Chart& chart, int x, int y, const Vec2& u) const {
     Vec2 st(around(x - chart.x, chart.width, u.x), around(y - chart.y, chart.height, u.y));
     const std::uint32_t patch = chart.face / 2;
     if (!patches_.quad(patch) && st.x + st.y > 1) st /= (st.x + st.y) * (1 + 0x1p-20f);  // beyond the edge: the nearest of it
-    return sample_irradiance(tracer, random, patches_.hit(patch, st), Patches::is_front(chart.face), wire);
+    return patches_.hit(patch, st);
   }
 
   bool pack();

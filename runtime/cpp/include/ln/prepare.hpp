@@ -2,6 +2,7 @@
 // What an operator may use while it prepares.
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "ln/camera.hpp"
@@ -10,10 +11,17 @@
 
 namespace ln {
 
-/// What the eye looks at: camera rays through a picture of this size.
+/// A side of a surface at a point where a probe or a lightmap measures.
+struct MeasuredPlace {
+  Hit hit;
+  bool front = true;
+};
+
+/// What results look at: camera rays through a picture of this size, and places on surfaces.
 struct View {
   CameraRays rays;
-  int width = 0, height = 0;
+  int width = 0, height = 0;  // 0: nothing is seen through the camera
+  std::function<std::vector<MeasuredPlace>()> measured = [] { return std::vector<MeasuredPlace>(); };
 };
 
 /// Access to the scene and to all cores, before the picture.

@@ -8,6 +8,7 @@
 
 #include "ln/film.hpp"
 #include "ln/options.hpp"
+#include "ln/prepare.hpp"
 #include "ln/program.hpp"
 #include "ln/receiver.hpp"
 #include "ln/render_passes.hpp"
@@ -31,6 +32,12 @@ class Probe {
 
   /// Finds the surfaces that the sensors are on. Throws Error if the wire is known on surfaces only and a sensor is on none.
   void place(Tracer& tracer);
+
+  /// Adds the sensors that are on surfaces.
+  void add_places(const Scene& scene, std::vector<MeasuredPlace>& places) const {
+    for (const Place& place : places_)
+      if (place.hit.found()) places.push_back({place.hit, Interaction(scene, place.hit, place.position, place.normal, white_receiver()).front});
+  }
 
   /// Adds the tile's samples of its sensors, which are the pixels of a picture of one row. The film is kept for
   /// render_passes, which estimates errors and counts samples with it.

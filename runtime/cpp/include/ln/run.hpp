@@ -117,6 +117,8 @@ class NetworkRun : public RunCallbacks {
 
  private:
   void write_pictures(const Film& film) const;
+  /// Places on surfaces at which probes and lightmaps measure; of a large lightmap a part.
+  std::vector<MeasuredPlace> measured_places() const;
   /// Finds the operators that carry no light in this scene, says so, and has the network leave them out. Throws Error if the
   /// program was compiled for a scene that has less. Where it `verifies`, nothing is left out.
   void skip_dark_nodes(bool verifies);

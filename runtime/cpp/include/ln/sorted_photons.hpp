@@ -28,4 +28,6 @@ struct SortedPhotons {
 
 SortedPhotons sort_by_surface(const SceneData& data, std::span<const Photon> photons);
 
+void write_tap(const TapFile& tap, const SortedPhotons& photons);
+
 }  // namespace ln

@@ -94,6 +94,27 @@ def run_program(tmp_path: Path) -> Callable[..., Run]:
     return run
 
 
+@pytest.fixture
+def kept_wire(compiled_network: Callable[..., Path], run_program: Callable[..., Run]) -> Callable[..., None]:
+    """kept_wire(name, text, change): a network with a cache makes the same picture from it, without a shadow ray; but
+    not after `--set change`."""
+
+    def check(name: str, text: str, change: str) -> None:
+        program, scene = compiled_network(name, text=text), SCENES / "cornell_box.gltf"
+        size = ("--size", "6x4", "--samples", "2")
+        first = run_program(program, scene, *size)
+        picture = first.picture.read_bytes()
+        again = run_program(program, scene, *size)
+        assert first.status == again.status == 0, first.stderr + again.stderr
+        assert again.picture.read_bytes() == picture
+        assert first.stats["rays"]["shadow"] > 1000 and again.stats["rays"]["shadow"] == 0
+        assert "cache" not in first.stderr + again.stderr
+        other = run_program(program, scene, *size, "--set", change)
+        assert "made by another network, or with other parameters" in other.stderr
+
+    return check
+
+
 @pytest.fixture(scope="session")
 def runtime_build() -> Path:
     """The runtime's build folder, configured with unit tests and tools."""

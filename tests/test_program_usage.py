@@ -162,6 +162,6 @@ def test_interrupt_writes_the_picture(program: Path, tmp_path: Path) -> None:
         os.kill(process.pid, signal.SIGINT)
         process.stderr.read()
         assert process.wait() == 130
-        assert time.monotonic() - before < 3
+        assert time.monotonic() - before < 20  # of 60, also on a machine that does much else
     assert (tmp_path / "out.exr").read_bytes()[:4] == b"\x76\x2f\x31\x01"
     assert [path.name for path in tmp_path.iterdir()] == ["out.exr"]

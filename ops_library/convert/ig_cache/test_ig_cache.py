@@ -3,11 +3,32 @@
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks import exr
 
 SCENES = Path(__file__).resolve().parents[3] / "examples" / "scenes"
+MEASURED = """
+network measured
+light  = Lights()
+direct = Direct(light)
+around = PathTracer(direct + smooth, via = D)
+smooth = IGInterpolator(IGCache(IGSampler(around)))
+traced = PathTracer(direct + traced, via = D)
+expect <= L (D|G|S)*
+probe smooth at "sensors.csv" -> "smooth.csv"
+probe traced at "sensors.csv" -> "traced.csv"
+"""
+SENSORS = """x,y,z,nx,ny,nz
+0,0,-2.7,0,1,0
+1.5,0,-2.7,0,1,0
+0,2.5,-5.5,0,0,1
+0,1,-5.5,0,0,1
+-3,2.5,-2.7,1,0,0
+3,2.5,-2.7,-1,0,0
+1.15,0,-1.9,0,1,0
+"""
 FEW = ("--set", "samples.samples=64")
 
 
@@ -50,3 +71,16 @@ def test_bounces_are_a_series(run):
     ]
     assert means[1] == pytest.approx(means[2], rel=0.02)
     assert means[0] < 0.97 * means[2]
+
+
+def test_records_where_probes_measure(compiled_network, run_program, tmp_path):
+    """Without a picture, the same light as path tracing finds; below a box on the floor (the last sensor) none."""
+    (tmp_path / "sensors.csv").write_text(SENSORS)
+    done = run_program(compiled_network("measured", text=MEASURED), SCENES / "cornell_box.gltf", "--samples", "4096")
+    assert done.status == 0, done.stderr
+    smooth, traced = (np.genfromtxt(tmp_path / f"{n}.csv", delimiter=",", names=True) for n in ("smooth", "traced"))
+    lux, truth = smooth["lux"], traced["lux"]
+    assert (np.abs(lux - truth) < 4 * traced["stderr"] + 0.02 * truth.max())[:-1].all(), lux / truth
+    assert np.abs(lux[:-1] / truth[:-1] - 1).mean() < 0.04
+    assert truth[-1] == 0
+    assert lux[-1] < 0.06 * truth.max()

@@ -1,8 +1,5 @@
 """The same picture from what was kept, without sampling it again."""
 
-from pathlib import Path
-
-SCENE = Path(__file__).resolve().parents[3] / "examples" / "scenes" / "cornell_box.gltf"
 NETWORK = """
 network kept_tri_mesh
 light  = Lights()
@@ -15,14 +12,5 @@ image  kept
 """
 
 
-def test_read_back(compiled_network, run_program):
-    program = compiled_network("kept_tri_mesh", text=NETWORK)
-    first = run_program(program, SCENE, "--size", "6x4", "--samples", "2")
-    picture = first.picture.read_bytes()
-    again = run_program(program, SCENE, "--size", "6x4", "--samples", "2")
-    assert first.status == again.status == 0, first.stderr + again.stderr
-    assert again.picture.read_bytes() == picture
-    assert first.stats["rays"]["shadow"] > 1000 and again.stats["rays"]["shadow"] == 0
-    assert "cache" not in first.stderr + again.stderr
-    other = run_program(program, SCENE, "--size", "6x4", "--samples", "2", "--set", "cells.error=6%")
-    assert "made by another network, or with other parameters" in other.stderr
+def test_read_back(kept_wire):
+    kept_wire("kept_tri_mesh", NETWORK, change="cells.error=6%")

@@ -48,8 +48,8 @@ struct IGCache {
   IrradianceRecordSets irradiance_records() const { return {seen_, beyond_}; }
 
  private:
-  // Records that the eye does not see: wider apart, less exact, made from fewer directions.
-  static constexpr float kCoarser = 4, kCoarserError = 1, kBeyondShare = 0.25f;
+  // Records that the eye does not see: wider apart, made from fewer directions.
+  static constexpr float kCoarser = 4, kCoarserError = 1, kBeyondShare = 0.125f;
   static constexpr float kSpotShare = 0.125f;  // of the directions, where something is sampled on the spot for a single request
   // Where they are wanted is found from about so many pixels, of places where others measure, and on all surfaces, then from the
   // records found so far.
@@ -67,19 +67,20 @@ struct IGCache {
     const Recursion before = recursion;
     recursion = {before.depth + 1, wanted};
     HemisphereRequest request(tracer, where, key, share);
-    const IrradianceSample result = samples(request);
+    IrradianceSample result = samples(request);
     recursion = before;
+    if (share < 1) result.nearest = kInfinity;  // guards against leaks that are seen only
     return result;
   }
 
   /// Places where this node is asked for light, when it makes samples at `origins` (few directions each). Answered by darkness.
   std::vector<Receiver> asked_from(PrepareContext& context, const std::vector<Receiver>& origins, const auto& samples) const {
     std::vector<std::vector<Receiver>> wanted(origins.size());
-    const float largest = scene_size(context.scene().data());
+    const View& view = context.view();
     context.for_chunks(origins.size(), 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
       for (std::size_t i = begin; i < end; ++i) {
         sample(tracer, origins[i], hash32(key_, static_cast<std::uint32_t>(i)), kProbeShare, samples, &wanted[i]);
-        for (Receiver& place : wanted[i]) place.footprint = std::min(origins[i].footprint + context.view().rays.height_at(place.hit.t), largest);
+        for (Receiver& place : wanted[i]) place.footprint = origins[i].footprint + (view.width > 0 ? view.rays.height_at(place.hit.t) : 0);
       }
     });
     std::vector<Receiver> all;

@@ -30,6 +30,16 @@ IrradianceSample combined(const IrradianceSample& a, const Color& factor, const 
   return sum;
 }
 
+/// Longest side of the scene's bounding box [normalised units].
+float scene_size(const SceneData& data) {
+  Vec3 low(kInfinity), high(-kInfinity);
+  for (const Vec3& p : data.positions) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  return data.positions.empty() ? 2.0f : max_component(high - low);
+}
+
 /// A receiver that is not seen in a picture.
 Receiver receiver_on(const Scene& scene, const Hit& hit, bool front, float footprint) {
   const Interaction at(scene, hit, front, white_receiver());
@@ -224,15 +234,6 @@ std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, Funct
   std::vector<Receiver> all;
   for (const auto& row : rows) all.insert(all.end(), row.begin(), row.end());
   return all;
-}
-
-float scene_size(const SceneData& data) {
-  Vec3 low(kInfinity), high(-kInfinity);
-  for (const Vec3& p : data.positions) {
-    low = glm::min(low, p);
-    high = glm::max(high, p);
-  }
-  return data.positions.empty() ? 2.0f : max_component(high - low);
 }
 
 std::vector<Receiver> measured_receivers(PrepareContext& context, std::size_t most) {

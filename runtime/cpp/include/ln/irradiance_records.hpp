@@ -169,9 +169,6 @@ class BounceSeries {
 std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, FunctionRef<bool(int x, int y)> choose,
                                      FunctionRef<bool(const Receiver&)> keep);
 
-/// Longest side of the scene's bounding box [normalised units].
-float scene_size(const SceneData& data);
-
 /// The places on surfaces where probes and lightmaps measure, evenly thinned out where they are more than `most`. There is no
 /// picture there: the whole scene counts as one.
 std::vector<Receiver> measured_receivers(PrepareContext& context, std::size_t most);

@@ -61,7 +61,8 @@ void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sampl
   // No record reaches past the edge of what it sees: there may be a gap behind.
   distance = std::min(distance, sample.nearest / spacing_.error);
   for_near(record.p, [&](const IrradianceRecord& near) {
-    if (glm::dot(near.n, record.n) > 0.5f) distance = std::min(distance, near.sample.distance + glm::distance(near.p, record.p));
+    if (glm::dot(near.n, record.n) > 0.5f)
+      distance = std::min(distance, near.sample.distance + glm::distance(near.p, record.p));
     return false;
   });
   const float low = spacing_.closest * where.footprint, high = spacing_.farthest * where.footprint;
@@ -123,7 +124,8 @@ void IrradianceRecords::insert(std::uint32_t record, std::int32_t node, const Ve
   }
   const float quarter = 0.5f * half;
   for (int octant = 0; octant < 8; ++octant) {
-    const Vec3 middle = centre + Vec3(octant & 1 ? quarter : -quarter, octant & 2 ? quarter : -quarter, octant & 4 ? quarter : -quarter);
+    const Vec3 middle =
+        centre + Vec3(octant & 1 ? quarter : -quarter, octant & 2 ? quarter : -quarter, octant & 4 ? quarter : -quarter);
     const Vec3 off = glm::max(glm::abs(records_[record].p - middle) - quarter, Vec3(0));
     if (glm::dot(off, off) > sqr(reach)) continue;
     if (nodes_[node].children[octant] < 0) {
@@ -134,14 +136,15 @@ void IrradianceRecords::insert(std::uint32_t record, std::int32_t node, const Ve
   }
 }
 
-std::vector<Receiver> cover(PrepareContext& context, IrradianceRecords& records, const std::vector<Receiver>& wanted, std::uint32_t key,
-                            SampleIrradiance sample) {
+std::vector<Receiver> cover(PrepareContext& context, IrradianceRecords& records, const std::vector<Receiver>& wanted,
+                            std::uint32_t key, SampleIrradiance sample) {
   constexpr std::size_t kSmallestBatch = 64;
 
   std::vector<Receiver> places;
   std::vector<std::uint32_t> left(wanted.size());
   std::iota(left.begin(), left.end(), 0u);
-  std::sort(left.begin(), left.end(), [](std::uint32_t a, std::uint32_t b) { return hash32(a) < hash32(b); });  // a bijection: no ties
+  std::sort(left.begin(), left.end(),
+            [](std::uint32_t a, std::uint32_t b) { return hash32(a) < hash32(b); });  // a bijection: no ties
   std::vector<char> covered;
   while (true) {
     covered.assign(left.size(), 0);
@@ -176,9 +179,11 @@ BounceSeries::BounceSeries(IrradianceRecords& records) : records_(records) {
   }
 }
 
-void BounceSeries::add(PrepareContext& context, const std::vector<Receiver>& places, std::uint32_t key, SampleIrradiance sample) {
+void BounceSeries::add(PrepareContext& context, const std::vector<Receiver>& places, std::uint32_t key,
+                       SampleIrradiance sample) {
   std::vector<IrradianceSample> samples(records_.size());
-  context.parallel_for(samples.size(), [&](Tracer& tracer, std::size_t i) { samples[i] = sample(tracer, places[i], record_key(key, i)); });
+  context.parallel_for(samples.size(),
+                       [&](Tracer& tracer, std::size_t i) { samples[i] = sample(tracer, places[i], record_key(key, i)); });
   const DVec3 before = last_sum_;
   last_sum_ = DVec3(0);
   for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -199,7 +204,8 @@ bool BounceSeries::converged() const {
 
 void BounceSeries::add_remaining() {
   const Color factor(ratio_ / (1.0 - ratio_));
-  for (std::size_t i = 0; i < last_.size(); ++i) records_.set_value(i, combined(records_.records()[i].sample, factor, last_[i]));
+  for (std::size_t i = 0; i < last_.size(); ++i)
+    records_.set_value(i, combined(records_.records()[i].sample, factor, last_[i]));
 }
 
 std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, FunctionRef<bool(int x, int y)> choose,
@@ -209,7 +215,8 @@ std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, Funct
   const auto follow = [&](Tracer& tracer, int x, int y, std::vector<Receiver>& found) {
     Ray ray = view.rays.ray(Vec2(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f));
     const SampleStream random(hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)),
-                                     static_cast<std::uint32_t>(context.seed())), 0);
+                                     static_cast<std::uint32_t>(context.seed())),
+                              0);
     float distance = 0;
     for (std::uint32_t depth = 0; depth < kMostSpecular; ++depth) {
       const Hit hit = tracer.intersect(ray, random.bits(depth, kCoverage + 1), node, RayKind::camera);
@@ -250,13 +257,15 @@ std::vector<Receiver> spread_receivers(PrepareContext& context, std::uint32_t co
   const Patches patches(scene.data());
   std::vector<double> areas(patches.face_count());
   for (std::uint32_t face = 0; face < patches.face_count(); ++face)
-    if (scatters_diffusely(scene, patches.part(face / 2), Patches::is_front(face))) areas[face] = static_cast<double>(area(patches.surface(face / 2)));
+    if (scatters_diffusely(scene, patches.part(face / 2), Patches::is_front(face)))
+      areas[face] = static_cast<double>(area(patches.surface(face / 2)));
   const Distribution by_area(areas);
   const float size = scene_size(scene.data());
   std::vector<Receiver> found;
   for (std::uint32_t i = 0; i < count && !by_area.empty(); ++i) {
     const SampleStream random(hash32(static_cast<std::uint32_t>(context.seed()), count), i);
-    const std::uint32_t face = by_area.sample((static_cast<float>(i) + random.get1(0, kRoulette)) / static_cast<float>(count)).index;
+    const std::uint32_t face =
+        by_area.sample((static_cast<float>(i) + random.get1(0, kRoulette)) / static_cast<float>(count)).index;
     const Hit hit = patches.hit(face / 2, patches.domain(face / 2).point(random.get2(0, kOwn)));
     found.push_back(receiver_on(scene, hit, Patches::is_front(face), size));
   }

@@ -19,10 +19,12 @@ float exposure(const PointTable& table) {
 void write_ply(const TapFile& tap, const PointTable& table) {
   const float scale = exposure(table);
   OutputFile file(tap.info.file);
-  file.write("ply\nformat binary_little_endian 1.0\ncomment " + table.title + " of '" + printable(tap.info.wire) + "' in the network '" +
-             printable(tap.network) + "', light paths " + printable(tap.info.light_paths, 1000) + "\ncomment " + table.units +
-             "; colours are sRGB of " + table.shown + " * " + number_text(static_cast<double>(scale)) + "\nelement vertex " + std::to_string(table.rows) + "\n");
-  for (const PointTable::Column& column : table.columns) file.write((column.integer ? "property uint " : "property float ") + column.name + "\n");
+  file.write("ply\nformat binary_little_endian 1.0\ncomment " + table.title + " of '" + printable(tap.info.wire) +
+             "' in the network '" + printable(tap.network) + "', light paths " + printable(tap.info.light_paths, 1000) +
+             "\ncomment " + table.units + "; colours are sRGB of " + table.shown + " * " +
+             number_text(static_cast<double>(scale)) + "\nelement vertex " + std::to_string(table.rows) + "\n");
+  for (const PointTable::Column& column : table.columns)
+    file.write((column.integer ? "property uint " : "property float ") + column.name + "\n");
   file.write("property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n");
   std::vector<double> values;
   for (std::size_t row = 0; row < table.rows; ++row) {
@@ -63,6 +65,8 @@ void write_csv(const TapFile& tap, const PointTable& table) {
 
 }  // namespace
 
-void write_points(const TapFile& tap, const PointTable& table) { tap.is(".csv") ? write_csv(tap, table) : write_ply(tap, table); }
+void write_points(const TapFile& tap, const PointTable& table) {
+  tap.is(".csv") ? write_csv(tap, table) : write_ply(tap, table);
+}
 
 }  // namespace ln

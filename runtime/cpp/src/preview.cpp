@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
+#include "legend.hpp"
 #include "ln/film.hpp"
 #include "ln/output_file.hpp"
-#include "legend.hpp"
 #include "png.hpp"
 #include "srgb.hpp"
 

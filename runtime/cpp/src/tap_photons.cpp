@@ -11,7 +11,9 @@ const std::vector<PointTable::Column> kPhotonColumns = {{"x"},    {"y"},    {"z"
                                                         {"wi_x"}, {"wi_y"}, {"wi_z"}, {"flux_r"}, {"flux_g"}, {"flux_b"}};
 constexpr const char* kPhotonUnits = "flux in W; wi: direction to where the light came from";
 
-Color flux(const Photon& photon, const SceneData& scene) { return static_cast<float>(scene.unit * scene.unit) * photon.flux.unpack(); }
+Color flux(const Photon& photon, const SceneData& scene) {
+  return static_cast<float>(scene.unit * scene.unit) * photon.flux.unpack();
+}
 
 /// The values of kPhotonColumns.
 void add_photon(const Photon& photon, const SceneData& scene, std::vector<double>& values) {

@@ -20,7 +20,16 @@ BytePicture ramp(int width, int height) {
 }  // namespace
 
 TEST_CASE("numbers of a legend are round, and not below what is to be shown") {
-  for (const auto& [value, expected] : {std::pair{0.93, 1.0}, {1.0, 1.0}, {1.2, 2.0}, {3.1, 4.0}, {4.4, 5.0}, {6.0, 8.0}, {8.5, 10.0}, {0.0021, 0.004}, {3e-37, 4e-37}, {7e20, 8e20}})
+  for (const auto& [value, expected] : {std::pair{0.93, 1.0},
+                                        {1.0, 1.0},
+                                        {1.2, 2.0},
+                                        {3.1, 4.0},
+                                        {4.4, 5.0},
+                                        {6.0, 8.0},
+                                        {8.5, 10.0},
+                                        {0.0021, 0.004},
+                                        {3e-37, 4e-37},
+                                        {7e20, 8e20}})
     CHECK(round_up(value) == doctest::Approx(expected));
 }
 
@@ -35,8 +44,10 @@ TEST_CASE("a legend stands beside the picture, which stays as it is") {
       for (int x = 0; x < picture.width; ++x)
         for (int i = 0; i < 3; ++i) {
           const unsigned char found = all.at(x, y)[i];
-          if (y < height) same = same && found == picture.at(x, y)[i];
-          else black_below = black_below && found == 0;
+          if (y < height)
+            same = same && found == picture.at(x, y)[i];
+          else
+            black_below = black_below && found == 0;
         }
     CHECK(same);
     CHECK(black_below);

@@ -8,8 +8,8 @@ their default settings, `--repeats` times with different seeds:
 
 - `relMSE`: mean((x - r)^2 / (r^2 + 0.01)) of one run, median of the repeats, the reference's own noise taken off;
 - `bias`: mean of the picture against the reference, with the standard error of both;
-- `seconds`, `rays`, `memory`: of one run, median;
-- `reference`: how long the reference tracer takes to the same relMSE.
+- `seconds`, `rays`, `memory`: of one run, median; seconds are processor time, of all threads together;
+- `reference`: the same of the reference tracer, as far as it takes to come to this relMSE.
 
 `--page` writes docs/agreement.md and its pictures. Times depend on the machine, the order of the rows much less.
 """
@@ -49,7 +49,7 @@ BATCHES = 8
 
 @dataclass(frozen=True)
 class Truth:
-    """A converged picture of the reference tracer, its variance, and what it takes: relMSE times seconds of a run."""
+    """A converged picture of the reference tracer, its variance, and what it takes: relMSE times processor seconds."""
 
     image: Image
     variance: Image
@@ -67,7 +67,7 @@ class Row:
     rays: float
     peak_bytes: float
     reference_seconds: float
-    """That the reference tracer takes to the same relMSE."""
+    """Processor time that the reference tracer takes to the same relMSE."""
 
 
 def light_paths(network: Path) -> str:
@@ -102,7 +102,7 @@ class Comparison:
             per_batch = max(1, self.reference_samples // BATCHES)
             runs = [run(program, scene, self.size, per_batch, 1000 + seed) for seed in range(BATCHES)]
             image, variance = mean_and_variance([r.image for r in runs])
-            work = statistics.median(r.seconds for r in runs) * BATCHES * _own_rel_mse(image, variance)
+            work = sum(r.cpu for r in runs) * _own_rel_mse(image, variance)
             exr.write(file, image, {"variance": variance, "work": np.full_like(image, work)})
         return Truth(exr.read(file), exr.read(file, "variance"), float(exr.read(file, "work")[0, 0, 0]))
 
@@ -128,7 +128,7 @@ def figures(runs: Sequence[Run], truth: Truth) -> Row:
         rel_mse=error,
         bias=statistics.mean(ratios) - 1,
         bias_error=float(np.hypot(statistics.stdev(ratios) / len(ratios) ** 0.5, of_truth)),
-        seconds=statistics.median(r.seconds for r in runs),
+        seconds=statistics.median(r.cpu for r in runs),
         rays=statistics.median(r.stats["rays"]["total"] for r in runs),
         peak_bytes=statistics.median(r.stats["peak_bytes"] for r in runs),
         reference_seconds=truth.work / error if error > 0 else float("inf"),
@@ -215,8 +215,9 @@ HEAD = """# Agreement
 
 Networks that carry the same light must show the same picture. Each row compares a network of `examples/`, at its
 default settings, with the reference tracer of its own light paths (`lnc compile --reference`), {reference} samples a
-pixel. All at {size}, {samples} samples a pixel, two threads. `bias` is the mean of the picture against the reference;
-`reference` is how long the reference tracer takes to the same relMSE. `python -m benchmarks.agreement` makes this page.
+pixel. All at {size}, {samples} samples a pixel. `bias` is the mean of the picture against the reference; `seconds` are
+processor time, of all threads together; `reference` is what the reference tracer takes to come to the same relMSE.
+`python -m benchmarks.agreement --cache FOLDER --page` makes this page.
 
 Below each table: the pictures in the order of the rows, and under each its difference from the reference in blocks of
 4 x 4 pixels, red where it is too bright, blue where it is too dark, full colour at 10 %."""

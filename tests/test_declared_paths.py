@@ -153,11 +153,6 @@ CLASSES = {
     "radiosity": ("small", "floor", "other"),
 }
 
-KNOWN_FAULTS = {
-    ("gradients", "all"): "+7.8 % at 64 and at 512 samples: too much light where the camera does not look",
-}
-"""More than is declared, by wire and class of surfaces. Each is an error of the operator that waits to be mended."""
-
 
 class Row(NamedTuple):
     """Energies of a wire on a class of surfaces [W], deviation and what is allowed of it [ratio]."""
@@ -223,8 +218,6 @@ def cases() -> Iterator:
             name = next(name for name, text in NETWORKS.items() if re.search(rf"^{wire} += ", text, re.M))
             for surfaces in ("all",) if wire == "map" else CLASSES[name]:
                 marks = [pytest.mark.slow] if name != "quick" else []
-                if (wire, surfaces) in KNOWN_FAULTS:
-                    marks.append(pytest.mark.xfail(strict=True, reason=KNOWN_FAULTS[wire, surfaces]))
                 yield pytest.param(name, wire, surfaces, id=f"{operator}-{wire}-{surfaces}", marks=marks)
 
 

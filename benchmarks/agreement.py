@@ -30,8 +30,8 @@ from numpy.typing import NDArray
 
 from benchmarks import exr
 from benchmarks.exr import Image
-from benchmarks.image_error import mean_and_variance, rel_mse
-from benchmarks.programs import EXAMPLES, ROOT, Run, compile_network, find_scene, run
+from benchmarks.image_error import mean_and_variance, noise, rel_mse
+from benchmarks.programs import EXAMPLES, ROOT, Programs, Run, find_scene, run
 
 NETWORKS = (
     "path_tracing",
@@ -82,7 +82,7 @@ class Comparison:
     """Runs of networks and references at one size; references are kept in `cache`, with their variance."""
 
     def __init__(
-        self, cache: Path, programs: Path, size: str, samples: int, reference_samples: int, repeats: int
+        self, cache: Path, programs: Programs, size: str, samples: int, reference_samples: int, repeats: int
     ) -> None:
         cache.mkdir(parents=True, exist_ok=True)
         self.cache = cache
@@ -98,26 +98,17 @@ class Comparison:
         key = f"{paths}|{re.findall('(?m)^tag .*$', network.read_text('utf-8'))}|{self.size}|{self.reference_samples}"
         file = self.cache / f"{scene.stem}_{hashlib.sha256(key.encode()).hexdigest()[:16]}.exr"
         if not file.exists():
-            program = self._program(f"reference_{network.stem}", network, "--reference", paths)
+            program = self.programs(network, "--reference", paths)
             per_batch = max(1, self.reference_samples // BATCHES)
             runs = [run(program, scene, self.size, per_batch, 1000 + seed) for seed in range(BATCHES)]
             image, variance = mean_and_variance([r.image for r in runs])
-            work = sum(r.cpu for r in runs) * _own_rel_mse(image, variance)
+            work = sum(r.cpu for r in runs) * noise(image, variance)
             exr.write(file, image, {"variance": variance, "work": np.full_like(image, work)})
         return Truth(exr.read(file), exr.read(file, "variance"), float(exr.read(file, "work")[0, 0, 0]))
 
     def runs(self, network: Path, scene: Path) -> list[Run]:
-        program = self._program(network.stem, network)
+        program = self.programs(network)
         return [run(program, scene, self.size, self.samples, seed) for seed in range(self.repeats)]
-
-    def _program(self, name: str, network: Path, *options: str) -> Path:
-        program = self.programs / name
-        return program if program.exists() else compile_network(network, program, *options)
-
-
-def _own_rel_mse(image: Image, variance: Image) -> float:
-    """The relMSE that a picture's own noise makes."""
-    return float(np.mean(variance / (image**2 + 0.01)))
 
 
 def figures(runs: Sequence[Run], truth: Truth) -> Row:
@@ -194,7 +185,12 @@ def main() -> None:
     sections = []
     with tempfile.TemporaryDirectory() as programs:
         comparison = Comparison(
-            options.cache, Path(programs), options.size, options.samples, options.reference_samples, options.repeats
+            options.cache,
+            Programs(Path(programs)),
+            options.size,
+            options.samples,
+            options.reference_samples,
+            options.repeats,
         )
         for scene in map(find_scene, options.scenes):
             rows, pictures = {}, []

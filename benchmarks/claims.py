@@ -21,22 +21,11 @@ import numpy as np
 
 from benchmarks import exr
 from benchmarks.image_error import rel_mse
-from benchmarks.programs import EXAMPLES, ROOT, compile_network, find_scene, run
+from benchmarks.programs import EXAMPLES, ROOT, Programs, find_scene, run
 from lnc.library_reader import load_library
 
 NETWORKS = ROOT / "benchmarks" / "networks"
 IMAGES = ROOT / "docs" / "images" / "claims"
-
-
-class Programs:
-    """Networks compiled on demand into a folder."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-
-    def __call__(self, network: Path) -> Path:
-        program = self.folder / network.stem
-        return program if program.exists() else compile_network(network, program)
 
 
 def final_gathering(programs: Programs, scene: str = "cornell_box", size: str = "160x120") -> str:

@@ -29,7 +29,7 @@ import numpy as np
 from benchmarks import programs
 from benchmarks.exr import Image
 from benchmarks.gltf_to_mitsuba import load_scene
-from benchmarks.image_error import block_test, mean_and_variance, mean_ratio, rel_mse
+from benchmarks.image_error import block_test, mean_and_variance, mean_ratio, noise, rel_mse
 from benchmarks.reference import Reference, reference, render, set_threads
 
 OURS = "ours"
@@ -132,7 +132,7 @@ def _mean_ratio_error(ratios: Sequence[float], truth: Reference) -> float:
 
 
 def report(result: dict[str, Any], truth: Reference) -> str:
-    own_noise = float(np.mean(truth.variance / (truth.image**2 + 0.01)))
+    own_noise = noise(truth.image, truth.variance)
     lines = [f"reference: relMSE of its own {own_noise:.1e}, taken off below"]
     lines += [f"{'':14} {'seconds':>9} {'cpu':>9} {'relMSE':>10} {'to 1e-2':>9} {'mean / reference':>20}"]
     renderers = {name: row for name, row in result.items() if name != "blocks"}

@@ -20,6 +20,11 @@ def rel_mse(image: Image, reference: Image, reference_variance: Image | None = N
     return float(np.mean(error * weight))
 
 
+def noise(image: Image, variance: Image) -> float:
+    """The relMSE that a picture has by its own noise, from the variance of its pixels."""
+    return float(np.mean(variance / (image**2 + 0.01)))
+
+
 def mean_ratio(image: Image, reference: Image) -> float:
     """Mean of the picture over mean of the reference, all channels together."""
     return float(image.mean() / reference.mean())

@@ -54,11 +54,22 @@ def run(
         return Run(exr.read(picture), json.loads(stats.read_text()), _child_cpu() - before)
 
 
-def compile_network(network: Path, program: Path, *options: str) -> Path:
-    """`lnc compile`, with further options such as --reference EXPR."""
-    command = [sys.executable, "-m", "lnc", "compile", str(network), "-o", str(program), *options]
-    subprocess.run(command, check=True, cwd=ROOT)
-    return program
+class Programs:
+    """Networks, compiled into a folder when they are first asked for."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.found: dict[tuple[str, ...], Path] = {}
+
+    def __call__(self, network: Path, *options: str) -> Path:
+        """The program of a network; with options of `lnc compile`, such as --reference EXPR."""
+        key = (str(network), *options)
+        if key not in self.found:
+            program = self.folder / f"{network.stem}_{len(self.found)}"
+            command = [sys.executable, "-m", "lnc", "compile", str(network), "-o", str(program), *options]
+            subprocess.run(command, check=True, cwd=ROOT)
+            self.found[key] = program
+        return self.found[key]
 
 
 def find_scene(name: str) -> Path:

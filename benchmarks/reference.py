@@ -22,6 +22,7 @@ import numpy as np
 from benchmarks import exr
 from benchmarks.exr import Image
 from benchmarks.gltf_to_mitsuba import load_scene
+from benchmarks.image_error import noise
 
 BATCH = 64
 """Samples per pixel of one call of Mitsuba: its llvm variants hold the whole wave in memory."""
@@ -92,10 +93,10 @@ def main() -> None:
     for scene in options.scenes:
         start = time.perf_counter()
         result = reference(scene, width, height, options.samples, options.cache)
-        noise = float(np.mean(result.variance / (result.image**2 + 0.01)))
+        own_noise = noise(result.image, result.variance)
         file = reference_file(scene, width, height, options.samples, options.cache)
         seconds = time.perf_counter() - start
-        print(f"{file}: mean {result.image.mean():.5f}, relMSE of its own {noise:.2e}, {seconds:.1f} s", flush=True)
+        print(f"{file}: mean {result.image.mean():.5f}, relMSE of its own {own_noise:.2e}, {seconds:.1f} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -38,10 +38,10 @@ class PathTracing final : public NetworkRun {
     const Scene& scene = tracer.scene();
     const Emitters& emitters = scene.emitters();
     Color result(0), beta(1);
-    SurfacePosition from;        // where the ray came from
+    SurfacePosition from;  // where the ray came from
     Vec3 from_side(0);
-    float pdf_w = 0;             // density of the ray's direction; 0: from the eye or specular
-    bool seen = true;            // only specular surfaces so far
+    float pdf_w = 0;   // density of the ray's direction; 0: from the eye or specular
+    bool seen = true;  // only specular surfaces so far
 
     for (std::uint32_t depth = 0;; ++depth) {
       const RayKind kind = seen ? RayKind::camera : RayKind::gather;
@@ -77,7 +77,8 @@ class PathTracing final : public NetworkRun {
 
       // Light from an emitter.
       if (any(at.bsdf().events() & Events::DG)) {
-        const LightSample s = emitters.sample(from, from_side, emitters.size() == 1 ? 0 : random.get1(vertex, kPick), random.get2(vertex, kPosition));
+        const LightSample s = emitters.sample(from, from_side, emitters.size() == 1 ? 0 : random.get1(vertex, kPick),
+                                              random.get2(vertex, kPosition));
         if (s.pdf_w > 0 && !is_black(s.radiance)) {
           const Vec3 local = at.frame.to_local(s.wi);
           if (at.side_agrees(s.wi, local.z)) {
@@ -114,8 +115,12 @@ class PathTracing final : public NetworkRun {
   }
 };
 
-constexpr NodeInfo kNodes[] = {{.name = "image", .op = "Image"}, {.name = "light", .op = "Lights"}, {.name = "direct", .op = "Direct"}, {.name = "pt", .op = "PathTracer"}};
-constexpr ProgramInfo kProgram = {.network = "path_tracing_monolith", .source_file = "path_tracing.cpp", .image_paths = "", .nodes = kNodes};
+constexpr NodeInfo kNodes[] = {{.name = "image", .op = "Image"},
+                               {.name = "light", .op = "Lights"},
+                               {.name = "direct", .op = "Direct"},
+                               {.name = "pt", .op = "PathTracer"}};
+constexpr ProgramInfo kProgram = {
+    .network = "path_tracing_monolith", .source_file = "path_tracing.cpp", .image_paths = "", .nodes = kNodes};
 
 }  // namespace
 

@@ -40,9 +40,9 @@ def light_conditions(network: Network, alphabet: Alphabet) -> dict[str, Formula]
     pictures = [network.image.terms] if network.image else []
     pictures += [tap.terms for tap in network.taps]
     accepting = automaton.seen(term for terms in pictures for term in terms)
-    for name, terms in network.results():
-        if not name.startswith(("image", "tap ")):  # nobody sees it: light only arrives
-            accepting |= automaton.surfaces(terms, name)
+    measured = [probe.terms for probe in network.probes] + [lightmap.terms for lightmap in network.lightmaps]
+    for terms in measured:  # nobody sees it: light only arrives
+        accepting |= automaton.surfaces(terms, "measured")
     silent = [[edge.target for edge in edges] for edges in automaton.graph.silent]
     states = {node.name: automaton.states_of(node.name) for node in network.nodes}
     return conditions(Nfa(automaton.graph.edges, silent, accepting), states, alphabet.eye)

@@ -14,9 +14,7 @@ struct AverageAmbient {
 
   template <class Request>
   Color answer(Request& request, const QuadTree&) const {
-    if constexpr (!any(Request::receives & Events::D)) return Color(0);
-    if (!any(request.at().bsdf().events() & Events::D)) return Color(0);
-    return request.scatter_irradiance(mean_);
+    return request.scatter_irradiance([&](const Interaction&) { return mean_; });
   }
 
   // State.

@@ -30,7 +30,9 @@ struct IGCache {
       static_cast<std::vector<Receiver>*>(recursion.purpose)->push_back({at.hit, at.front, at.at.p, at.frame.n, 0});
       return;
     }
-    const auto read = [&](const IrradianceRecords& records, float limit) { return records.visit(at.at.p, at.frame.n, limit, request.visit); };
+    const auto read = [&](const IrradianceRecords& records, float limit) {
+      return records.visit(at.at.p, at.frame.n, limit, request.visit);
+    };
     if (recursion.depth > 0) {
       float cover = read(beyond_, IrradianceRecords::kOverlap);
       if (cover <= IrradianceRecords::kEnough) cover += read(beyond_, IrradianceRecords::kFar);
@@ -51,8 +53,8 @@ struct IGCache {
   // Records that the eye does not see: wider apart, made from fewer directions.
   static constexpr float kCoarser = 4, kCoarserError = 1, kBeyondShare = 0.125f;
   static constexpr float kSpotShare = 0.125f;  // of the directions, where something is sampled on the spot for a single request
-  // Where they are wanted is found from about so many pixels, of places where others measure, and on all surfaces, then from the
-  // records found so far.
+  // Where they are wanted is found from about so many pixels, of places where others measure, and on all surfaces, then from
+  // the records found so far.
   static constexpr std::size_t kProbes = 1024;
   static constexpr float kProbeShare = 1.0f / 32;
   static constexpr std::uint32_t kSpread = 64;
@@ -61,8 +63,8 @@ struct IGCache {
 
   /// Samples at a receiver; requests that come back to this node meanwhile are one level deeper. With `wanted`, they are noted
   /// there and answered by darkness.
-  LN_NOINLINE IrradianceSample sample(Tracer& tracer, const Receiver& where, std::uint32_t key, float share, const auto& samples,
-                                      std::vector<Receiver>* wanted = nullptr) const {
+  LN_NOINLINE IrradianceSample sample(Tracer& tracer, const Receiver& where, std::uint32_t key, float share,
+                                      const auto& samples, std::vector<Receiver>* wanted = nullptr) const {
     Recursion& recursion = tracer.recursion(node);
     const Recursion before = recursion;
     recursion = {before.depth + 1, wanted};
@@ -80,7 +82,8 @@ struct IGCache {
     context.for_chunks(origins.size(), 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
       for (std::size_t i = begin; i < end; ++i) {
         sample(tracer, origins[i], hash32(key_, static_cast<std::uint32_t>(i)), kProbeShare, samples, &wanted[i]);
-        for (Receiver& place : wanted[i]) place.footprint = origins[i].footprint + (view.width > 0 ? view.rays.height_at(place.hit.t) : 0);
+        for (Receiver& place : wanted[i])
+          place.footprint = origins[i].footprint + (view.width > 0 ? view.rays.height_at(place.hit.t) : 0);
       }
     });
     std::vector<Receiver> all;
@@ -88,11 +91,12 @@ struct IGCache {
     return all;
   }
 
-  /// Irradiance at surfaces that the eye does not see, where this node feeds itself: the fixed point of one more bounce. Each round
-  /// follows the same directions, so rounds differ by the light of one more bounce only.
+  /// Irradiance at surfaces that the eye does not see, where this node feeds itself: the fixed point of one more bounce. Each
+  /// round follows the same directions, so rounds differ by the light of one more bounce only.
   void solve_beyond(PrepareContext& context, const auto& samples) {
     const View& view = context.view();
-    const int stride = 1 + static_cast<int>(std::sqrt(static_cast<float>(view.width) * static_cast<float>(view.height) / static_cast<float>(kProbes)));
+    const int stride = 1 + static_cast<int>(std::sqrt(static_cast<float>(view.width) * static_cast<float>(view.height) /
+                                                      static_cast<float>(kProbes)));
     const std::vector<Receiver> seen = seen_receivers(
         context, node, [&](int x, int y) { return x % stride == 0 && y % stride == 0; }, [](const Receiver&) { return true; });
     std::vector<Receiver> places;
@@ -110,18 +114,22 @@ struct IGCache {
     const auto with_bounces_so_far = [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
       return sample(tracer, where, key, kBeyondShare, samples);
     };
-    for (std::int64_t round = 1; round < bounces && !series.converged(); ++round) series.add(context, places, key_, with_bounces_so_far);
+    for (std::int64_t round = 1; round < bounces && !series.converged(); ++round)
+      series.add(context, places, key_, with_bounces_so_far);
     series.add_remaining();
     ambient_.sample.irradiance = beyond_.mean_irradiance();
   }
 
   /// Records where the eye sees surfaces, from a wide grid of pixels to all of them, and where probes and lightmaps measure.
   void cover_seen(PrepareContext& context, const auto& samples) {
-    const auto exactly = [&](Tracer& tracer, const Receiver& where, std::uint32_t key) { return sample(tracer, where, key, 1, samples); };
+    const auto exactly = [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
+      return sample(tracer, where, key, 1, samples);
+    };
     for (int stride = kWidestStride; stride > 0; stride /= 2) {
       const auto on_grid = [](int x, int y, int width) { return x % width == 0 && y % width == 0; };
       std::vector<Receiver> wanted = seen_receivers(
-          context, node, [&](int x, int y) { return on_grid(x, y, stride) && (stride == kWidestStride || !on_grid(x, y, 2 * stride)); },
+          context, node,
+          [&](int x, int y) { return on_grid(x, y, stride) && (stride == kWidestStride || !on_grid(x, y, 2 * stride)); },
           [&](const Receiver& r) { return !seen_.covers(r.p, r.n); });
       cover(context, seen_, wanted, key_ + 1, exactly);
     }

@@ -12,13 +12,12 @@ struct IGInterpolator {
 
   template <class Request>
   Color answer(Request& request, const auto& records) const {
-    if constexpr (!any(Request::receives & Events::D)) return Color(0);
-    const Interaction& at = request.at();
-    if (!any(at.bsdf().events() & Events::D)) return Color(0);
-    WeightedMean mean{at.at.p, at.frame.n, gradients};
-    RecordRequest query(request.tracer(), request.random(), at, request.depth(), mean);
-    records(query);
-    return mean.weight > 0 ? request.scatter_irradiance(glm::max(mean.sum / mean.weight, Color(0))) : Color(0);
+    return request.scatter_irradiance([&](const Interaction& at) {
+      WeightedMean mean{at.at.p, at.frame.n, gradients};
+      RecordRequest query(request.tracer(), request.random(), at, request.depth(), mean);
+      records(query);
+      return mean.weight > 0 ? glm::max(mean.sum / mean.weight, Color(0)) : Color(0);
+    });
   }
 
  private:

@@ -21,11 +21,9 @@ struct LepskiDensity {
 
   template <class Request>
   Color answer(Request& request, const PhotonMap& map) const {
-    if constexpr (!any(Request::receives & Events::D)) return Color(0);
-    const Interaction& at = request.at();
-    if (map.empty() || !any(at.bsdf().events() & Events::D)) return Color(0);
-    const Neighbourhood around{at.at.p, at.front ? at.at.ng : -at.at.ng, at.front};
-    return request.scatter_irradiance(adaptive_local_linear(map, area_, around, kernels_).E);
+    if (map.empty()) return Color(0);
+    return request.scatter_irradiance(
+        [&](const Interaction& at) { return adaptive_local_linear(map, area_, neighbourhood(at), kernels_).E; });
   }
 
   // State.

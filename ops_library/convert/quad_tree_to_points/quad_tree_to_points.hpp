@@ -11,10 +11,8 @@ struct QuadTreeToPoints {
 
   template <class Request>
   Color answer(Request& request, const QuadTree& tree) const {
-    if constexpr (!any(Request::receives & Events::D)) return Color(0);
-    const Interaction& at = request.at();
-    if (!any(at.bsdf().events() & Events::D)) return Color(0);
-    return request.scatter_irradiance(tree.irradiance(at.hit.triangle, at.hit.u, at.hit.v, at.front));
+    return request.scatter_irradiance(
+        [&](const Interaction& at) { return tree.irradiance(at.hit.triangle, at.hit.u, at.hit.v, at.front); });
   }
 };
 

@@ -15,7 +15,8 @@ struct SurfaceDE {
 
   void prepare(PrepareContext& context, const SortedPhotons& photons) {
     const auto unit = static_cast<float>(context.scene().data().unit);
-    mesh_ = photon_mesh(context, photons, {node, {static_cast<int>(fewest), static_cast<int>(neighbours), radius / unit}, spacing});
+    mesh_ =
+        photon_mesh(context, photons, {node, {static_cast<int>(fewest), static_cast<int>(neighbours), radius / unit}, spacing});
   }
 
   /// The TriMesh wire.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "ln/diffuse_surface.hpp"
+#include "ln/distribution.hpp"
 
 namespace ln {
 
@@ -52,14 +53,14 @@ Color ambient_irradiance(PrepareContext& context, NodeId node, const QuadTree& i
   DVec3 flux(0);
   double lit_area = 0;
   std::vector<DarkCell> dark;
-  std::vector<double> dark_area;  // of the cells up to each
+  std::vector<double> dark_area;
   for (std::uint32_t face = 0; face < patches.face_count(); ++face) {
     const std::uint32_t part = patches.part(face / 2);
     if (!from(scene.part_tags(part))) continue;
     const SurfaceCell surface = patches.surface(face / 2);
     const auto add_dark = [&](const DomainCell& cell) {
       dark.push_back({face, cell});
-      dark_area.push_back((dark_area.empty() ? 0 : dark_area.back()) + static_cast<double>(area(surface_cell(surface, cell))));
+      dark_area.push_back(static_cast<double>(area(surface_cell(surface, cell))));
     };
     in.for_each_leaf(face, [&](const DomainCell& cell, const Color& E) {
       if (is_black(E)) return add_dark(cell);
@@ -74,18 +75,18 @@ Color ambient_irradiance(PrepareContext& context, NodeId node, const QuadTree& i
 
   // Measure which share of what is dark light can reach, at points that are spread evenly over it.
   constexpr std::uint32_t kPoints = 4096;
-  std::vector<std::uint8_t> reached(dark.empty() ? 0 : kPoints);
+  const Distribution by_area(dark_area);
+  std::vector<std::uint8_t> reached(by_area.empty() ? 0 : kPoints);
   context.for_chunks(reached.size(), 64, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
     tracer.enter(node);
     for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
-      const double target = dark_area.back() * (static_cast<double>(i) + 0.5) / kPoints;
-      const auto k = std::min(std::upper_bound(dark_area.begin(), dark_area.end(), target), dark_area.end() - 1);
-      const DarkCell& cell = dark[static_cast<std::size_t>(k - dark_area.begin())];
-      reached[i] = reaches_light(tracer, node, in, cell.face, cell.domain.point(sobol_point(node, 1, i)), hash32(node, i)) ? 1 : 0;
+      const DarkCell& cell = dark[by_area.sample((static_cast<float>(i) + 0.5f) / kPoints).index];
+      reached[i] =
+          reaches_light(tracer, node, in, cell.face, cell.domain.point(sobol_point(node, 1, i)), hash32(node, i)) ? 1 : 0;
     }
   });
   const auto count = std::count(reached.begin(), reached.end(), 1);
-  const double shadow_area = reached.empty() ? 0 : dark_area.back() * static_cast<double>(count) / kPoints;
+  const double shadow_area = by_area.total() * static_cast<double>(count) / kPoints;
   return Color(flux / (lit_area + shadow_area));
 }
 

@@ -51,9 +51,9 @@ struct Bsdf::Interface {
 /// What depends on wo alone: albedos, and the probabilities of the lobes in the mask.
 struct Bsdf::View {
   FacetAlbedo facets;
-  Color below{0};          // share that the specular layer lets through to the diffuse base
+  Color below{0};  // share that the specular layer lets through to the diffuse base
   Color solid_deficit{0};
-  float reach = 0;         // Ggx::reach(wo.z)
+  float reach = 0;  // Ggx::reach(wo.z)
   float cap_share = 1;
   // Their sum is 1, or 0 where nothing scatters.
   float p_diffuse = 0, p_facet = 0, p_multiple_up = 0, p_multiple_down = 0;
@@ -123,7 +123,8 @@ Bsdf::Bsdf(const BsdfParameters& p, bool outside, const DielectricTable* table) 
         const Vec2 front = table_->average(true, roughness), back = table_->average(false, roughness);
         for (int c = 0; c < 3; c++) {
           const float k = coating_[c];
-          const float a = std::max(front.x + k * (front.y - front.x), 1e-12f), b = std::max(back.x + k * (back.y - back.x), 1e-12f);
+          const float a = std::max(front.x + k * (front.y - front.x), 1e-12f),
+                      b = std::max(back.x + k * (back.y - back.x), 1e-12f);
           const float crossing = (1 - k * front_average) * std::min({a, b, n2 * b});
           const float down = outside ? crossing / a : crossing / (n2 * b);
           solid_up_[c] = transmission_ * (1 - down) * kInvPi / (outside ? a : b);
@@ -230,7 +231,8 @@ BsdfValue Bsdf::evaluate_smooth(const View& v, const Vec3& wo, const Vec3& wi, E
     }
     if (kDensity) {
       const float p = v.p_facet * interface.reflection_probability(facet);
-      result.pdf_w += p * density * Ggx::reflection_pdf(wo.z, v.reach, v.cap_share) + v.p_multiple_up * Grazing(alpha_).pdf_w(wi.z);
+      result.pdf_w +=
+          p * density * Ggx::reflection_pdf(wo.z, v.reach, v.cap_share) + v.p_multiple_up * Grazing(alpha_).pdf_w(wi.z);
     }
     return result;
   }

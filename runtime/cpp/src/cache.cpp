@@ -74,11 +74,13 @@ void add(Fingerprint& f, const Material& m) {
   f.add(m.name);
   add(f, m.tags);
   for (const Color& c : {m.base_color, m.emission, m.attenuation_color, m.specular_color}) add(f, c);
-  for (const float x : {m.alpha, m.metallic, m.roughness, m.normal_scale, m.alpha_cutoff, m.ior, m.transmission, m.attenuation_distance, m.specular}) f.add(x);
+  for (const float x : {m.alpha, m.metallic, m.roughness, m.normal_scale, m.alpha_cutoff, m.ior, m.transmission,
+                        m.attenuation_distance, m.specular})
+    f.add(x);
   f.add(m.alpha_mode);
   for (const bool x : {m.double_sided, m.unlit, m.solid}) f.add(x);
-  for (const TextureRef* t : {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.emissive_texture, &m.transmission_texture,
-                              &m.specular_texture, &m.specular_color_texture})
+  for (const TextureRef* t : {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.emissive_texture,
+                              &m.transmission_texture, &m.specular_texture, &m.specular_color_texture})
     add(f, *t);
 }
 
@@ -172,7 +174,8 @@ std::string load_cache(const std::string& path, std::string_view representation,
   }
   const std::string_view bytes = file.text();
   Header header;
-  if (bytes.size() < sizeof header || !bytes.starts_with(std::string_view(kMagic, sizeof kMagic))) throw Error("it is no cache");
+  if (bytes.size() < sizeof header || !bytes.starts_with(std::string_view(kMagic, sizeof kMagic)))
+    throw Error("it is no cache");
   std::memcpy(&header, bytes.data(), sizeof header);
   if (header.version != kVersion) throw Error("it was written by another version of this program");
   if (header.header != fingerprint(header)) throw Error("it is damaged");
@@ -201,7 +204,8 @@ void save_cache(const std::string& path, std::string_view representation, const 
 }
 
 void refuse_cache(const std::string& path, std::string_view reason) {
-  if (!reason.empty()) note(printable(path) + ": this cache is not used, " + std::string(reason) + "; it is computed and written again");
+  if (!reason.empty())
+    note(printable(path) + ": this cache is not used, " + std::string(reason) + "; it is computed and written again");
 }
 
 // --- Representations -------------------------------------------------------------------------------------------------
@@ -255,7 +259,8 @@ void decode(CacheReader& in, PrepareContext& context, QuadTree& tree) {
   require(faces == 0 || faces == patches->face_count());
   for (std::uint32_t face = 0; face < faces; ++face) {
     std::vector<QuadTreeNode> nodes = in.get_all<QuadTreeNode>();
-    for (std::size_t i = 0; i < nodes.size(); ++i) require(nodes[i].leaf() || (nodes[i].children > i && nodes[i].children + 3u < nodes.size()));
+    for (std::size_t i = 0; i < nodes.size(); ++i)
+      require(nodes[i].leaf() || (nodes[i].children > i && nodes[i].children + 3u < nodes.size()));
     if (!nodes.empty()) tree.set(face, std::move(nodes));
   }
   require(in.at_end());

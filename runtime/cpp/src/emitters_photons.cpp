@@ -41,7 +41,8 @@ PhotonEmission Emitters::emit(float u_pick, const Vec2& u_position, const Vec2& 
       const float cosine = glm::dot(aimed.w, light.n);
       photon.direction = aimed.w;
       photon.cos_theta = std::abs(cosine);
-      if (cosine > 0 || light.double_sided) photon.flux = radiance * (photon.cos_theta * aimed.solid_angle * light.area() * inverse);
+      if (cosine > 0 || light.double_sided)
+        photon.flux = radiance * (photon.cos_theta * aimed.solid_angle * light.area() * inverse);
       return photon;
     }
     const bool back = light.double_sided && pick.u >= 0.5f;

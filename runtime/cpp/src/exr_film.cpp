@@ -60,8 +60,8 @@ Imf::Header make_header(int width, int height, const std::vector<std::string>& c
 }
 
 /// Writes the file strip by strip; `fill(y, row)` puts channel values of row y side by side, pixel by pixel.
-void write_rows(const std::string& path, int width, int height, const std::vector<std::string>& channels, const ExrMetadata& metadata,
-                int threads, FunctionRef<void(int y, float* row)> fill) {
+void write_rows(const std::string& path, int width, int height, const std::vector<std::string>& channels,
+                const ExrMetadata& metadata, int threads, FunctionRef<void(int y, float* row)> fill) {
   OutputFile file(path);
   const CompressionThreads compression(threads);
   try {
@@ -75,7 +75,8 @@ void write_rows(const std::string& path, int width, int height, const std::vecto
       const int rows = std::min(strip_rows, height - y0);
       for (int y = 0; y < rows; ++y) fill(y0 + y, strip.data() + static_cast<std::size_t>(y) * row_bytes / sizeof(float));
       // OpenEXR wants the address that pixel (0, 0) would have.
-      char* origin = reinterpret_cast<char*>(reinterpret_cast<std::uintptr_t>(strip.data()) - static_cast<std::size_t>(y0) * row_bytes);
+      char* origin =
+          reinterpret_cast<char*>(reinterpret_cast<std::uintptr_t>(strip.data()) - static_cast<std::size_t>(y0) * row_bytes);
       Imf::FrameBuffer buffer;
       for (std::size_t c = 0; c < channels.size(); ++c) {
         buffer.insert(channels[c], Imf::Slice(Imf::FLOAT, origin + c * sizeof(float), pixel_bytes, row_bytes));
@@ -100,7 +101,8 @@ void add_channels(std::vector<std::string>& channels, const std::string& prefix)
 
 }  // namespace
 
-void write_exr(const std::string& path, const Film& film, const ProgramInfo& program, const ExrMetadata& metadata, int threads) {
+void write_exr(const std::string& path, const Film& film, const ProgramInfo& program, const ExrMetadata& metadata,
+               int threads) {
   ExrMetadata attributes{{"network", std::string(program.network)}, {"lightPaths", std::string(program.image_paths)}};
   std::vector<std::string> channels;
   add_channels(channels, "");

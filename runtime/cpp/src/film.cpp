@@ -15,8 +15,8 @@ void check_memory(int width, int height, int layer_count) {
   const std::uint64_t available = available_memory_bytes() / 5 * 4;  // others live here too
   if (needed <= available) return;
   throw Error("a picture of " + std::to_string(width) + "x" + std::to_string(height) + " with " + std::to_string(layer_count) +
-              " layers needs " + bytes_text(static_cast<double>(needed)) + " of memory, this machine has " + bytes_text(static_cast<double>(available)) +
-              " free: choose a smaller --size");
+              " layers needs " + bytes_text(static_cast<double>(needed)) + " of memory, this machine has " +
+              bytes_text(static_cast<double>(available)) + " free: choose a smaller --size");
 }
 
 float limited(double mean) {
@@ -111,7 +111,8 @@ Film::Range Film::sample_range() const {
 
 // With a and b the means of the halves, of n_a and n_b samples, (a - b)^2 n_a n_b / (n_a + n_b)^2 has the variance of the whole
 // mean as its expectation if the halves are independent, and a b that of r^2. Where it is wrong:
-// - Halves of a low-discrepancy sequence avoid each other, which makes a - b larger than it would be: the estimate errs upwards.
+// - Halves of a low-discrepancy sequence avoid each other, which makes a - b larger than it would be: the estimate errs
+// upwards.
 // - 1 / (a b + 0.01) is convex: upwards again.
 // - Light that no sample has found yet is not in it: downwards, for all estimators of this kind. The standard error and the
 //   16 samples that render_passes asks for keep a lucky first look from ending a render.

@@ -63,7 +63,8 @@ int GlbWriter::add_positions(std::span<const Vec3> values) {
 
 int GlbWriter::add_indices(std::span<const std::uint32_t> values) {
   const int view = add_view(values.data(), values.size_bytes(), kIndexTarget);
-  json["accessors"].push_back({{"bufferView", view}, {"componentType", kUnsignedInt}, {"count", values.size()}, {"type", "SCALAR"}});
+  json["accessors"].push_back(
+      {{"bufferView", view}, {"componentType", kUnsignedInt}, {"count", values.size()}, {"type", "SCALAR"}});
   return static_cast<int>(json["accessors"].size()) - 1;
 }
 
@@ -91,7 +92,8 @@ void GlbWriter::write(const std::string& path) const {
   if (whole["scenes"][0]["nodes"].empty()) whole["scenes"][0].erase("nodes");  // glTF allows no empty list
   const std::string text = padded(whole.dump(-1, ' ', false, Json::error_handler_t::replace), ' ');
   const std::size_t size = 12 + 8 + text.size() + (binary.empty() ? 0 : 8 + binary.size());
-  if (size > std::numeric_limits<std::uint32_t>::max()) throw Error(path + ": would be larger than the 4 GiB that a .glb file can have; use fewer cells");
+  if (size > std::numeric_limits<std::uint32_t>::max())
+    throw Error(path + ": would be larger than the 4 GiB that a .glb file can have; use fewer cells");
   std::string header = "glTF";
   append_u32(header, 2);
   append_u32(header, size);
@@ -109,6 +111,8 @@ void GlbWriter::write(const std::string& path) const {
   file.commit();
 }
 
-float exposure_of(double mean_luminance) { return mean_luminance > 0 ? static_cast<float>(std::clamp(0.25 / mean_luminance, 1e-30, 1e30)) : 1.0f; }
+float exposure_of(double mean_luminance) {
+  return mean_luminance > 0 ? static_cast<float>(std::clamp(0.25 / mean_luminance, 1e-30, 1e30)) : 1.0f;
+}
 
 }  // namespace ln::gltf

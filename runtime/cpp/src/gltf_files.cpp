@@ -29,7 +29,8 @@ MemoryBudget::MemoryBudget(std::uint64_t limit) : limit_(static_cast<double>(lim
 void MemoryBudget::claim(double bytes, const std::string& what) {
   if (!(used_ + bytes <= limit_)) {
     const std::string besides = used_ > 0 ? " (" + bytes_text(used_) + " are in use)" : "";
-    throw Error(what + " needs " + bytes_text(bytes) + " of memory" + besides + ", more than the limit of " + bytes_text(limit_));
+    throw Error(what + " needs " + bytes_text(bytes) + " of memory" + besides + ", more than the limit of " +
+                bytes_text(limit_));
   }
   used_ += bytes;
 }

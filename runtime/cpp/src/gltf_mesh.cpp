@@ -107,7 +107,8 @@ MeshSize MeshWriter::measure(Json mesh) const {
     size.triangles += triangles;
     size.vertices += used;
     if (triangles == 0) continue;
-    size.bytes += sizeof(Part) + triangles * (sizeof(UVec3) + sizeof(std::uint32_t) + kScratchPerTriangle) + used * vertex_bytes;
+    size.bytes +=
+        sizeof(Part) + triangles * (sizeof(UVec3) + sizeof(std::uint32_t) + kScratchPerTriangle) + used * vertex_bytes;
   }
   return size;
 }
@@ -209,7 +210,8 @@ bool MeshWriter::read_corners(Json primitive, std::size_t vertex_count) {
   const std::size_t triangles = triangle_count(mode, count);
   if (mode == kTriangles && count % 3 != 0)
     model_.notes.count("primitive ends with an incomplete triangle", "primitives end with an incomplete triangle", 1);
-  if (vertex_count > UINT32_MAX || triangles * 3 > UINT32_MAX) primitive.fail("has more than 4,294,967,295 vertices or corners");
+  if (vertex_count > UINT32_MAX || triangles * 3 > UINT32_MAX)
+    primitive.fail("has more than 4,294,967,295 vertices or corners");
 
   const std::uint32_t restart = !indices                                         ? UINT32_MAX
                                 : component_bytes(indices.component_type()) == 1 ? 0xff
@@ -361,7 +363,8 @@ void MeshWriter::append_vertex(const Attributes& attributes, const Part& part, c
   }
   world_.push_back(transform.point(position));
 
-  append(scene_.normals, world_, part.has_normals, part.has_normals ? unit_or_zero(normal_transform * normal) : Vec3(0), Vec3(0));
+  append(scene_.normals, world_, part.has_normals, part.has_normals ? unit_or_zero(normal_transform * normal) : Vec3(0),
+         Vec3(0));
   Vec4 world_tangent(0);
   if (part.has_tangents) {
     // Under a mirroring transform the bitangent turns against normal x tangent.
@@ -408,7 +411,8 @@ void MeshWriter::append_triangles(const std::vector<bool>& mirrored, std::uint32
   if (broken > 0)
     model_.notes.count("triangle with a position that is not a finite number or beyond 1e30 was dropped",
                        "triangles with positions that are not finite numbers or beyond 1e30 were dropped", broken);
-  if (degenerate > 0) model_.notes.count("triangle without area was dropped", "triangles without area were dropped", degenerate);
+  if (degenerate > 0)
+    model_.notes.count("triangle without area was dropped", "triangles without area were dropped", degenerate);
 }
 
 }  // namespace ln::gltf

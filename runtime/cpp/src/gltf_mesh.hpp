@@ -61,8 +61,8 @@ class MeshWriter {
                         std::size_t vertex) const;
   void append_part(Part part, const Attributes& attributes, const Affine& world, const std::vector<Affine>* joints,
                    bool is_strip);
-  void append_vertex(const Attributes& attributes, const Part& part, const Affine& transform, const glm::dmat3& normal_transform,
-                     std::size_t vertex);
+  void append_vertex(const Attributes& attributes, const Part& part, const Affine& transform,
+                     const glm::dmat3& normal_transform, std::size_t vertex);
   void append_triangles(const std::vector<bool>& mirrored, std::uint32_t first_vertex, bool is_strip);
 
   Model& model_;

@@ -1,5 +1,6 @@
 #pragma once
-// A glTF file after its members are checked and its buffers are in memory: what the readers of materials, meshes and nodes share.
+// A glTF file after its members are checked and its buffers are in memory: what the readers of materials, meshes and nodes
+// share.
 
 #include <cstring>
 #include <map>

@@ -74,7 +74,8 @@ void SceneReader::measure() {
     total.bytes += copies * (size.bytes + sizeof(Affine)) +
                    parts * (name_and_tags_bytes(node) + name_and_tags_bytes(model_.meshes[mesh.index()]));
   });
-  model_.memory.claim(total.bytes, model_.document->file() + ": the scene, with " + number_text(total.triangles) + " triangles,");
+  model_.memory.claim(total.bytes,
+                      model_.document->file() + ": the scene, with " + number_text(total.triangles) + " triangles,");
   meshes_.reserve(total);
 }
 
@@ -90,7 +91,8 @@ void SceneReader::place_joints() {
   });
 }
 
-/// What moves a vertex from the mesh to the world if it hangs on joint i alone: the joint's place times the inverse bind matrix.
+/// What moves a vertex from the mesh to the world if it hangs on joint i alone: the joint's place times the inverse bind
+/// matrix.
 const std::vector<Affine>& SceneReader::joints_of(std::size_t skin_index) {
   const auto [found, is_new] = joints_.try_emplace(skin_index);
   if (!is_new) return found->second;

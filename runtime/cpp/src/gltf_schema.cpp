@@ -75,7 +75,9 @@ struct Rule {
 };
 
 constexpr Rule boolean(std::string_view member) { return {member, Form::boolean}; }
-constexpr Rule integer(std::string_view member, double low, double high = kExact) { return {member, Form::integer, {low, high}}; }
+constexpr Rule integer(std::string_view member, double low, double high = kExact) {
+  return {member, Form::integer, {low, high}};
+}
 constexpr Rule number(std::string_view member, Range range = {}) { return {member, Form::number, range}; }
 constexpr Rule numbers(std::string_view member, std::size_t length, Range range = {}) {
   return {member, Form::numbers, range, length};

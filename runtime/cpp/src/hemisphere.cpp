@@ -30,7 +30,9 @@ Vec3 HemisphereGrid::direction(int ring, int sector, const Vec2& u) const {
 
 IrradianceSample integrate(const HemisphereGrid& grid, std::span<const HemisphereCell> cells, const Frame& frame) {
   const auto rings = static_cast<std::size_t>(grid.polar), sectors = static_cast<std::size_t>(grid.azimuth);
-  const auto cell = [&](std::size_t ring, std::size_t sector) -> const HemisphereCell& { return cells[ring * sectors + sector]; };
+  const auto cell = [&](std::size_t ring, std::size_t sector) -> const HemisphereCell& {
+    return cells[ring * sectors + sector];
+  };
   const float step = 2 * kPi / static_cast<float>(sectors);
 
   // What a ring's borders and its inside contribute, at its polar angles theta: sin^2(theta) = ring / rings.

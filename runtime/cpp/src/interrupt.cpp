@@ -16,9 +16,9 @@ void on_signal(int number) {
 }
 
 void handle_unless_ignored(int number) {
-  struct sigaction present {};
+  struct sigaction present{};
   if (sigaction(number, nullptr, &present) == 0 && present.sa_handler == SIG_IGN) return;
-  struct sigaction action {};
+  struct sigaction action{};
   action.sa_handler = on_signal;
   action.sa_flags = SA_RESTART;
   sigemptyset(&action.sa_mask);

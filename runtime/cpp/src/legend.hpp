@@ -16,14 +16,17 @@ struct BytePicture {
 
   BytePicture(int width, int height)
       : width(width), height(height), rgb(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {}
-  unsigned char* at(int x, int y) { return &rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x))]; }
+  unsigned char* at(int x, int y) {
+    return &rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x))];
+  }
 };
 
 /// The smallest of 1, 2, 4, 5, 8 times a power of ten that is not below `value`, as quarters of these are short numbers.
 double round_up(double value);
 
-/// The picture with a colour bar at its right: from `colour(0)` at the bottom, for the value 0, to `colour(1)` for `top`, with four
-/// equal steps. `title` and `unit` stand above. A low picture gets black below it.
-BytePicture with_legend(const BytePicture& picture, FunctionRef<Color(float)> colour, double top, const std::string& title, const std::string& unit);
+/// The picture with a colour bar at its right: from `colour(0)` at the bottom, for the value 0, to `colour(1)` for `top`, with
+/// four equal steps. `title` and `unit` stand above. A low picture gets black below it.
+BytePicture with_legend(const BytePicture& picture, FunctionRef<Color(float)> colour, double top, const std::string& title,
+                        const std::string& unit);
 
 }  // namespace ln

@@ -9,7 +9,9 @@ namespace ln {
 
 LetterSet letters_of(const Scene& scene, std::span<const int> tags) {
   const SceneData& data = scene.data();
-  const auto bit_of = [&](TagSet given) { return std::uint64_t{1} << tag_mask(given, tags.data(), static_cast<int>(tags.size())); };
+  const auto bit_of = [&](TagSet given) {
+    return std::uint64_t{1} << tag_mask(given, tags.data(), static_cast<int>(tags.size()));
+  };
   std::vector<Events> events;
   for (const Material& material : data.materials) events.push_back(possible_events(data, material));
 

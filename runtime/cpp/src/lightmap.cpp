@@ -39,19 +39,24 @@ void Lightmap::lay_out(const SceneData& data, int side) {
       smallest = true;
       for (Chart& chart : charts_) {
         const SurfaceCell cell = patches_.surface(chart.face / 2);
-        const auto size = [&](const Vec3& edge) { return 1 + std::clamp(static_cast<int>(std::ceil(static_cast<double>(glm::length(edge)) / texel)), 1, side_ - 1); };
+        const auto size = [&](const Vec3& edge) {
+          return 1 + std::clamp(static_cast<int>(std::ceil(static_cast<double>(glm::length(edge)) / texel)), 1, side_ - 1);
+        };
         chart.width = size(cell.a);
         chart.height = size(cell.b);
         smallest = smallest && chart.width == 2 && chart.height == 2;
       }
       if (pack()) {
-        if (side_ > side) note(std::string(info_.file) + ": " + std::to_string(charts_.size()) + " patches need an atlas of " + std::to_string(side_) + " texels a side");
+        if (side_ > side)
+          note(std::string(info_.file) + ": " + std::to_string(charts_.size()) + " patches need an atlas of " +
+               std::to_string(side_) + " texels a side");
         return;
       }
       texel *= 1.05;
     }
   }
-  throw Error(std::string(info_.file) + ": the scene has " + std::to_string(charts_.size()) + " patches, more than an atlas of " + std::to_string(kLargestLightmap) +
+  throw Error(std::string(info_.file) + ": the scene has " + std::to_string(charts_.size()) +
+              " patches, more than an atlas of " + std::to_string(kLargestLightmap) +
               " texels a side has room for; tap a QuadTree instead");
 }
 
@@ -59,7 +64,8 @@ void Lightmap::lay_out(const SceneData& data, int side) {
 bool Lightmap::pack() {
   std::vector<std::uint32_t> order(charts_.size());
   std::iota(order.begin(), order.end(), 0u);
-  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return charts_[a].height > charts_[b].height; });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return charts_[a].height > charts_[b].height; });
   int x = 0, y = 0, shelf = 0;
   for (const std::uint32_t i : order) {
     Chart& chart = charts_[i];
@@ -80,8 +86,11 @@ bool Lightmap::pack() {
     for (int t = 0; t < chart.height; ++t) {
       for (int s = 0; s < chart.width; ++s) {
         // Of a triangle, what bilinear look-ups inside of it touch.
-        const float beyond = static_cast<float>(s - 1) / static_cast<float>(chart.width - 1) + static_cast<float>(t - 1) / static_cast<float>(chart.height - 1);
-        if (quad || beyond < 1) texels_[static_cast<std::size_t>(chart.y + t) * static_cast<std::size_t>(side_) + static_cast<std::size_t>(chart.x + s)] = i;
+        const float beyond = static_cast<float>(s - 1) / static_cast<float>(chart.width - 1) +
+                             static_cast<float>(t - 1) / static_cast<float>(chart.height - 1);
+        if (quad || beyond < 1)
+          texels_[static_cast<std::size_t>(chart.y + t) * static_cast<std::size_t>(side_) +
+                  static_cast<std::size_t>(chart.x + s)] = i;
       }
     }
   }
@@ -108,12 +117,13 @@ void Lightmap::write(const Film& film, const char* network, const SceneData& dat
   std::transform(irradiance.begin(), irradiance.end(), bytes.begin(), [&](float value) { return srgb_byte(value * exposure); });
 
   const std::string atlas = atlas_file(info_.file);
-  gltf::GlbWriter writer({{"network", network},
-                          {"wire", info_.wire},
-                          {"lightPaths", info_.light_paths},
-                          {"exposure", exposure},
-                          {"colours", "irradiance * exposure, cut off at 1; " + atlas.substr(atlas.rfind('/') + 1) + " holds it uncut"},
-                          {"unit", "W/m^2"}});
+  gltf::GlbWriter writer(
+      {{"network", network},
+       {"wire", info_.wire},
+       {"lightPaths", info_.light_paths},
+       {"exposure", exposure},
+       {"colours", "irradiance * exposure, cut off at 1; " + atlas.substr(atlas.rfind('/') + 1) + " holds it uncut"},
+       {"unit", "W/m^2"}});
   const int material = writer.add_unlit_material("irradiance");
   constexpr int kLinear = 9729, kClamp = 33071;
   writer.json["images"] = {{{"bufferView", writer.add_bytes(png_bytes(side_, side_, bytes))}, {"mimeType", "image/png"}}};
@@ -135,20 +145,23 @@ void Lightmap::write(const Film& film, const char* network, const SceneData& dat
       for (int k = 0; k < cell.corner_count(); ++k) {
         const Vec2 st = domain.corner(k);
         positions.push_back(cell.corner(k) + off);
-        uvs.push_back((Vec2(chart.x, chart.y) + 0.5f + st * Vec2(chart.width - 1, chart.height - 1)) / static_cast<float>(side_));
+        uvs.push_back((Vec2(chart.x, chart.y) + 0.5f + st * Vec2(chart.width - 1, chart.height - 1)) /
+                      static_cast<float>(side_));
       }
       for (auto k = static_cast<std::uint32_t>(cell.corner_count() - 1); k >= 2; --k)
         indices.insert(indices.end(), {first, first + (front ? k - 1 : k), first + (front ? k : k - 1)});
     }
     if (indices.empty()) continue;
     writer.add_mesh(front ? "front" : "back",
-                    {{"attributes", {{"POSITION", writer.add_positions(positions)}, {"TEXCOORD_0", writer.add(std::span<const Vec2>(uvs))}}},
+                    {{"attributes",
+                      {{"POSITION", writer.add_positions(positions)}, {"TEXCOORD_0", writer.add(std::span<const Vec2>(uvs))}}},
                      {"indices", writer.add_indices(indices)},
                      {"material", material}},
                     data);
   }
   writer.write(info_.file);
-  write_exr(atlas, side_, side_, irradiance.data(), {{"network", std::string(network)}, {"lightPaths", std::string(info_.light_paths)}});
+  write_exr(atlas, side_, side_, irradiance.data(),
+            {{"network", std::string(network)}, {"lightPaths", std::string(info_.light_paths)}});
 }
 
 }  // namespace ln

@@ -65,7 +65,8 @@ Events possible_events(const SceneData& data, const Material& m) {
     return Bsdf(p, true).events();
   }
   const ColorRange surface = texture_range(data, m.metallic_roughness_texture);
-  const ColorRange transmission = texture_range(data, m.transmission_texture), specular = texture_range(data, m.specular_texture);
+  const ColorRange transmission = texture_range(data, m.transmission_texture),
+                   specular = texture_range(data, m.specular_texture);
   Events events = Events::none;
   if (m.metallic * surface.low.z < 1 && m.transmission * transmission.low.x < 1 && !is_black(m.base_color)) events = Events::D;
   if (m.metallic * surface.high.z > 0 || m.transmission * transmission.high.x > 0 || m.specular * specular.high.w > 0) {
@@ -97,7 +98,8 @@ Vec4 tangent_from_uvs(const SceneData& data, const TextureRef& ref, std::uint32_
 
 }  // namespace
 
-Vec3 mapped_normal(const SceneData& data, const Material& material, const VertexAttributes& at, std::uint32_t triangle, const Vec3& normal) {
+Vec3 mapped_normal(const SceneData& data, const Material& material, const VertexAttributes& at, std::uint32_t triangle,
+                   const Vec3& normal) {
   if (!material.normal_texture) return normal;
   Vec4 tangent = data.parts[data.triangle_part[triangle]].has_tangents ? at.tangent() : Vec4(0);
   const Vec3 given = Vec3(tangent) - glm::dot(Vec3(tangent), normal) * normal;

@@ -125,7 +125,8 @@ std::string quantity_text(ParameterKind kind, double value) {
     case ParameterKind::count:
       for (std::size_t i = kCountUnits.size(); i-- > 1;) {
         const double scaled = value / kCountUnits[i].factor;
-        if (std::abs(scaled) >= 1 && scaled == std::floor(scaled)) return number_text(scaled) + std::string(kCountUnits[i].name);
+        if (std::abs(scaled) >= 1 && scaled == std::floor(scaled))
+          return number_text(scaled) + std::string(kCountUnits[i].name);
       }
       return number_text(value);
     case ParameterKind::ratio: return number_text(std::round(value * 1e8) / 1e6) + "%";
@@ -148,7 +149,8 @@ double shortest(float value) {
 std::string range_text(const ParameterSlot& slot) {
   if (slot.kind == ParameterKind::flag || slot.kind == ParameterKind::text) return "";
   const bool above = std::isfinite(slot.minimum), below = std::isfinite(slot.maximum);
-  if (above && below) return "between " + quantity_text(slot.kind, slot.minimum) + " and " + quantity_text(slot.kind, slot.maximum);
+  if (above && below)
+    return "between " + quantity_text(slot.kind, slot.minimum) + " and " + quantity_text(slot.kind, slot.maximum);
   if (above) return "at least " + quantity_text(slot.kind, slot.minimum);
   if (below) return "at most " + quantity_text(slot.kind, slot.maximum);
   return "";
@@ -195,8 +197,10 @@ std::string did_you_mean(std::string_view word, const std::vector<std::string>& 
 std::int64_t parse_whole(std::string_view option, std::string_view text, std::int64_t least, std::int64_t most) {
   const std::int64_t value = parse_count(option, text);
   if (value < least || value > most) {
-    refuse(option, "a whole number between " + quantity_text(ParameterKind::count, static_cast<double>(least)) + " and " +
-                       quantity_text(ParameterKind::count, static_cast<double>(most)), text);
+    refuse(option,
+           "a whole number between " + quantity_text(ParameterKind::count, static_cast<double>(least)) + " and " +
+               quantity_text(ParameterKind::count, static_cast<double>(most)),
+           text);
   }
   return value;
 }
@@ -216,7 +220,8 @@ double parse_time_limit(std::string_view text) {
 std::uint64_t parse_seed(std::string_view text) {
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) refuse("--seed", "a whole number from 0 to 18446744073709551615", text);
+  if (error != std::errc() || end != text.data() + text.size())
+    refuse("--seed", "a whole number from 0 to 18446744073709551615", text);
   return value;
 }
 
@@ -225,7 +230,8 @@ void parse_size(std::string_view text, Options& options) {
   const auto side = [&](std::string_view digits) {
     int value = 0;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (error != std::errc() || end != digits.data() + digits.size() || value < 1 || value > kLargestSide) refuse("--size", kWanted, text);
+    if (error != std::errc() || end != digits.data() + digits.size() || value < 1 || value > kLargestSide)
+      refuse("--size", kWanted, text);
     return value;
   };
   const std::size_t x = text.find_first_of("xX");
@@ -233,7 +239,8 @@ void parse_size(std::string_view text, Options& options) {
   options.width = side(text.substr(0, x));
   options.height = side(text.substr(x + 1));
   if (std::int64_t{options.width} * options.height > kMostPixels) {
-    throw UsageError("--size " + std::string(text) + " has more pixels than the " + std::to_string(kMostPixels >> 20) + " million that a picture may have");
+    throw UsageError("--size " + std::string(text) + " has more pixels than the " + std::to_string(kMostPixels >> 20) +
+                     " million that a picture may have");
   }
 }
 
@@ -252,7 +259,8 @@ Enum parse_choice(std::string_view option, std::string_view text, std::initializ
 int available_processors() {
   cpu_set_t set;
   CPU_ZERO(&set);
-  const int count = sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : static_cast<int>(std::thread::hardware_concurrency());
+  const int count =
+      sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : static_cast<int>(std::thread::hardware_concurrency());
   return std::clamp(count, 1, kMostThreads);
 }
 
@@ -275,13 +283,15 @@ void apply_set(std::string_view text, const ProgramInfo& program) {
     std::string all;
     for (const std::string& each : names) all += (all.empty() ? "" : ", ") + each;
     const std::string suggestion = did_you_mean(name, names);
-    throw UsageError("--set: node '" + printable(node) + "' has no parameter " + quote(name) + (suggestion.empty() ? "; it has " + all : suggestion));
+    throw UsageError("--set: node '" + printable(node) + "' has no parameter " + quote(name) +
+                     (suggestion.empty() ? "; it has " + all : suggestion));
   }
   for (const NodeInfo& info : program.nodes) {
     if (node == info.name) throw UsageError("--set: node '" + printable(node) + "' has no parameters to set");
   }
   if (nodes.empty()) throw UsageError("--set: network '" + network + "' has no parameters to set");
-  throw UsageError("--set: network '" + network + "' has no node " + quote(node) + " with parameters" + did_you_mean(node, nodes) + "; see --help");
+  throw UsageError("--set: network '" + network + "' has no node " + quote(node) + " with parameters" +
+                   did_you_mean(node, nodes) + "; see --help");
 }
 
 std::string parameters_help(const ProgramInfo& program) {
@@ -301,7 +311,9 @@ std::string parameters_help(const ProgramInfo& program) {
     if (std::string_view(previous) != slot.node) {
       for (const NodeInfo& node : program.nodes) {
         if (std::string_view(node.name) == slot.node) {
-          text += "  " + std::string(node.name) + " = " + node.op + (node.line > 0 ? "  (" + std::string(program.source_file) + ":" + std::to_string(node.line) + ")" : "") + "\n";
+          text += "  " + std::string(node.name) + " = " + node.op +
+                  (node.line > 0 ? "  (" + std::string(program.source_file) + ":" + std::to_string(node.line) + ")" : "") +
+                  "\n";
         }
       }
       previous = slot.node;
@@ -321,7 +333,8 @@ std::string replaced(std::string text, std::string_view before, std::string_view
 
 /// The texts of all options as they were given.
 struct RawOptions {
-  std::string scene, output, size, camera, samples, time, error, seed, threads, stats, progress, preview, environment, units, lightmap_size;
+  std::string scene, output, size, camera, samples, time, error, seed, threads, stats, progress, preview, environment, units,
+      lightmap_size;
   std::vector<std::string> sets;
   bool version = false, print_letters = false, verify_paths = false;
 };
@@ -332,7 +345,8 @@ void declare_options(CLI::App& app, RawOptions& raw) {
     app.add_option(names, value, text)->type_name(placeholder)->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   };
   add("-o,--output", raw.output, "FILE.exr", "the picture (default: out.exr)");
-  add("--size", raw.size, "WxH", "pixels; keeps the vertical field of view (default: 640 for the longer side, by the camera's aspect)");
+  add("--size", raw.size, "WxH",
+      "pixels; keeps the vertical field of view (default: 640 for the longer side, by the camera's aspect)");
   add("--camera", raw.camera, "NAME", "camera of the scene (default: the first)");
   add("--samples", raw.samples, "N", "stop after N camera paths a pixel (default without any limit: 64)");
   add("--time", raw.time, "SECONDS", "stop after this wall time of prepare and render; every pixel gets one sample at least");
@@ -350,7 +364,8 @@ void declare_options(CLI::App& app, RawOptions& raw) {
   add("--units", raw.units, "UNITS", "radiometric or photometric (default: radiometric)");
   add("--lightmap-size", raw.lightmap_size, "N", "texels along each side of a lightmap's texture (default: 512)");
   app.add_flag("--verify-paths", raw.verify_paths,
-               "no picture: compare the energy on every wire with its light paths; exit status 1 if one deviates (--samples: points a batch)");
+               "no picture: compare the energy on every wire with its light paths; exit status 1 if one deviates (--samples: "
+               "points a batch)");
   app.add_flag("--version", raw.version, "print the version and exit");
   app.add_flag("--print-letters", raw.print_letters)->group("");  // not for users: asked by `lnc compile --scene`
 }
@@ -388,7 +403,9 @@ void require_suffix(std::string_view option, std::string_view path, std::string_
 /// The picture is OpenEXR whatever its name says; names that say something else are a mistake.
 void refuse_other_format(std::string_view path) {
   for (const char* suffix : {".png", ".jpg", ".jpeg", ".hdr", ".tif", ".tiff", ".bmp", ".ppm", ".pfm", ".webp"}) {
-    if (path.ends_with(suffix)) throw UsageError("the picture is an OpenEXR file: -o must end in .exr, not " + quote(path) + " (for a PNG add --preview)");
+    if (path.ends_with(suffix))
+      throw UsageError("the picture is an OpenEXR file: -o must end in .exr, not " + quote(path) +
+                       " (for a PNG add --preview)");
   }
 }
 
@@ -433,7 +450,8 @@ void set_parameter(const ParameterSlot& slot, std::string_view value) {
       refuse(name, "one of " + choices_text(slot), value);
     default: {
       const double number = parse_quantity(name, slot.kind, value);
-      if (!(std::abs(number) <= static_cast<double>(std::numeric_limits<float>::max()))) refuse(name, examples_of(slot.kind), value);
+      if (!(std::abs(number) <= static_cast<double>(std::numeric_limits<float>::max())))
+        refuse(name, examples_of(slot.kind), value);
       // A float may round to just beyond its bound.
       check_range(number);
       return store(slot, static_cast<float>(number));
@@ -443,7 +461,8 @@ void set_parameter(const ParameterSlot& slot, std::string_view value) {
 
 std::string parameter_text(const ParameterSlot& slot) {
   switch (slot.kind) {
-    case ParameterKind::count: return quantity_text(slot.kind, static_cast<double>(*static_cast<const std::int64_t*>(slot.value)));
+    case ParameterKind::count:
+      return quantity_text(slot.kind, static_cast<double>(*static_cast<const std::int64_t*>(slot.value)));
     case ParameterKind::flag: return *static_cast<const bool*>(slot.value) ? "true" : "false";
     case ParameterKind::text: return *static_cast<const std::string*>(slot.value);
     case ParameterKind::choice: {
@@ -455,15 +474,16 @@ std::string parameter_text(const ParameterSlot& slot) {
 }
 
 Options parse_options(int argc, const char* const* argv, const ProgramInfo& program) {
-  CLI::App app("Renders a glTF scene with the lighting network '" + std::string(program.network) + "' (" + program.source_file + ").\n" +
-                   "Light paths of the picture: " + program.image_paths,
+  CLI::App app("Renders a glTF scene with the lighting network '" + std::string(program.network) + "' (" + program.source_file +
+                   ").\n" + "Light paths of the picture: " + program.image_paths,
                argc > 0 ? std::string(argv[0]).substr(std::string(argv[0]).rfind('/') + 1) : program.network);
   RawOptions raw;
   declare_options(app, raw);
   app.allow_extras();
   app.get_formatter()->column_width(28);
-  app.footer(parameters_help(program) + (program.parameters.empty() ? "" : "\n") +
-             "Exit status 0: the picture is written; 1: it failed; 2: wrong usage; 130: interrupted, what was rendered is written.");
+  app.footer(
+      parameters_help(program) + (program.parameters.empty() ? "" : "\n") +
+      "Exit status 0: the picture is written; 1: it failed; 2: wrong usage; 130: interrupted, what was rendered is written.");
   try {
     std::vector<std::string> arguments;
     for (int i = argc - 1; i > 0; --i) arguments.emplace_back(argv[i]);  // CLI11 takes them from the back
@@ -490,25 +510,34 @@ Options parse_options(int argc, const char* const* argv, const ProgramInfo& prog
   refuse_other_format(options.output);
   if (!raw.size.empty()) parse_size(raw.size, options);
   options.camera = raw.camera;
-  if (!raw.samples.empty()) options.samples = static_cast<std::uint32_t>(parse_whole("--samples", raw.samples, 1, kMostSamples));
+  if (!raw.samples.empty())
+    options.samples = static_cast<std::uint32_t>(parse_whole("--samples", raw.samples, 1, kMostSamples));
   if (!raw.time.empty()) options.time = parse_time_limit(raw.time);
-  if (!raw.error.empty()) options.error = require_positive("--error", parse_quantity("--error", ParameterKind::ratio, raw.error), raw.error);
+  if (!raw.error.empty())
+    options.error = require_positive("--error", parse_quantity("--error", ParameterKind::ratio, raw.error), raw.error);
   options.default_samples = !options.samples && !options.time && !options.error;
   if (options.default_samples) options.samples = kDefaultSamples;
   if (!raw.seed.empty()) options.seed = parse_seed(raw.seed);
-  options.threads = raw.threads.empty() ? available_processors() : static_cast<int>(parse_whole("--threads", raw.threads, 1, kMostThreads));
+  options.threads =
+      raw.threads.empty() ? available_processors() : static_cast<int>(parse_whole("--threads", raw.threads, 1, kMostThreads));
   options.print_letters = raw.print_letters;
   options.stats_path = raw.stats;
   options.preview_path = raw.preview;
   require_suffix("--preview", raw.preview, ".png");
   options.environment_path = raw.environment;
   if (!raw.progress.empty()) {
-    options.progress = parse_choice<ProgressMode>("--progress", raw.progress, {{"auto", ProgressMode::automatic}, {"plain", ProgressMode::plain}, {"json", ProgressMode::json}, {"none", ProgressMode::none}});
+    options.progress = parse_choice<ProgressMode>("--progress", raw.progress,
+                                                  {{"auto", ProgressMode::automatic},
+                                                   {"plain", ProgressMode::plain},
+                                                   {"json", ProgressMode::json},
+                                                   {"none", ProgressMode::none}});
   }
   if (!raw.units.empty()) {
-    options.units = parse_choice<Units>("--units", raw.units, {{"radiometric", Units::radiometric}, {"photometric", Units::photometric}});
+    options.units =
+        parse_choice<Units>("--units", raw.units, {{"radiometric", Units::radiometric}, {"photometric", Units::photometric}});
   }
-  if (!raw.lightmap_size.empty()) options.lightmap_side = static_cast<int>(parse_whole("--lightmap-size", raw.lightmap_size, 16, kLargestLightmap));
+  if (!raw.lightmap_size.empty())
+    options.lightmap_side = static_cast<int>(parse_whole("--lightmap-size", raw.lightmap_size, 16, kLargestLightmap));
   const auto unused = [&](const char* name, const std::string& value, bool used) {
     if (!used && !value.empty()) options.unused.push_back(name);
   };

@@ -59,8 +59,8 @@ std::string advice(int error_number) {
 
 /// Where the bytes of `path` go.
 struct Target {
-  std::string path;        // links followed
-  bool in_place = false;   // a device
+  std::string path;       // links followed
+  bool in_place = false;  // a device
   bool exists = false;
   mode_t mode = 0;
 };
@@ -68,7 +68,7 @@ struct Target {
 /// Throws Error for what is neither a file nor a device that takes bytes.
 Target find_target(const std::string& path) {
   if (path.empty()) throw Error("an output has no name");
-  struct stat status {};
+  struct stat status{};
   if (path.back() == '/') throw Error(path + ": cannot write: this is a folder; name a file in it");
   if (::stat(path.c_str(), &status) != 0) {
     if (errno != ENOENT) throw_output_error(path, "write", errno);
@@ -160,7 +160,8 @@ void OutputFile::flush() {
   if (failed_) fail("write", failed_);
   std::size_t done = 0;
   while (done < buffer_.size()) {
-    const ssize_t written = ::pwrite(file_, buffer_.data() + done, buffer_.size() - done, static_cast<off_t>(buffer_start_ + done));
+    const ssize_t written =
+        ::pwrite(file_, buffer_.data() + done, buffer_.size() - done, static_cast<off_t>(buffer_start_ + done));
     if (written < 0 && errno == EINTR) continue;
     if (written <= 0) fail("write", written < 0 ? errno : EIO);
     done += static_cast<std::size_t>(written);
@@ -191,7 +192,7 @@ void write_output_file(const std::string& path, std::string_view bytes) {
 void check_output(const std::string& path) { const OutputFile file(path); }
 
 bool same_file(const std::string& a, const std::string& b) {
-  struct stat status_a {}, status_b {};
+  struct stat status_a{}, status_b{};
   const bool have_a = ::stat(a.c_str(), &status_a) == 0, have_b = ::stat(b.c_str(), &status_b) == 0;
   if (have_a != have_b) return false;
   if (have_a) return status_a.st_dev == status_b.st_dev && status_a.st_ino == status_b.st_ino && !S_ISCHR(status_a.st_mode);

@@ -187,8 +187,10 @@ float PhotonMap::likely_distance2(const Vec3& p, std::size_t wanted) const {
   std::uint32_t begin = 0, end = static_cast<std::uint32_t>(blocks_.size());
   while ((end - begin) / 2 * kBlock >= wanted) {
     const std::uint32_t middle = (begin + end) / 2;
-    if (p[nodes_[middle].axis] < nodes_[middle].split) end = middle;
-    else begin = middle;
+    if (p[nodes_[middle].axis] < nodes_[middle].split)
+      end = middle;
+    else
+      begin = middle;
   }
   Lanes low[3], high[3];
   for (int axis = 0; axis < 3; ++axis) {

@@ -10,8 +10,8 @@ namespace {
 
 // Lengths are in radii of the ball from here on.
 
-/// Directions in which the surface is measured: more of them where moments are wanted, as weights made of these are sensitive to
-/// a strip of surface between a point and a border that it is near to.
+/// Directions in which the surface is measured: more of them where moments are wanted, as weights made of these are sensitive
+/// to a strip of surface between a point and a border that it is near to.
 constexpr int direction_count(PhotonKernel kernel) { return kernel == PhotonKernel::parabola ? 128 : 32; }
 /// Parts of equal area along each direction, for telling what is covered twice.
 constexpr int kRings = 64;
@@ -66,7 +66,8 @@ class Sweep {
     const float orientation = c > 0 ? 1.0f : -1.0f;
     for (int j = 0; j < kDirections; ++j) {
       const float dx = kDirection.x[j], dy = kDirection.y[j];
-      const bool between = (line.a.x * dy - line.a.y * dx) * orientation >= 0 && (dx * line.b.y - dy * line.b.x) * orientation >= 0;
+      const bool between =
+          (line.a.x * dy - line.a.y * dx) * orientation >= 0 && (dx * line.b.y - dy * line.b.x) * orientation >= 0;
       const float slope = dx * along.y - dy * along.x;
       const float distance = c / slope;
       if (between && distance > 0) reach_[j] = std::min(reach_[j], distance * distance);
@@ -265,7 +266,8 @@ SurfaceArea::SurfaceArea(PrepareContext& context, const SceneData& data) : data_
     for (auto* high : {&boxes.high, &boxes.normal_high}) std::fill(&(*high)[0][0], &(*high)[0][0] + 3 * kWidth, -kInfinity);
     return boxes;
   };
-  const auto include = [](float (&lows)[3][kWidth], float (&highs)[3][kWidth], std::size_t lane, const Vec3& low, const Vec3& high) {
+  const auto include = [](float (&lows)[3][kWidth], float (&highs)[3][kWidth], std::size_t lane, const Vec3& low,
+                          const Vec3& high) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       lows[axis][lane] = std::min(lows[axis][lane], low[axis]);
       highs[axis][lane] = std::max(highs[axis][lane], high[axis]);
@@ -367,7 +369,8 @@ bool crossing(const LocalTriangle& triangle, SurfaceBlocker& line) {
 
 /// False: there are too many triangles.
 template <PhotonKernel kernel>
-bool SurfaceArea::measure_with(const Neighbourhood& around, float radius, TriangleFilter filter, SurfaceCoverage& coverage) const {
+bool SurfaceArea::measure_with(const Neighbourhood& around, float radius, TriangleFilter filter,
+                               SurfaceCoverage& coverage) const {
   const Frame frame = make_frame(around.normal);
   const float side = around.front ? 1.0f : -1.0f;
   const float scale = 1 / radius;
@@ -382,10 +385,12 @@ bool SurfaceArea::measure_with(const Neighbourhood& around, float radius, Triang
   bool too_many = false;
   for_near(around, radius, [&](std::uint32_t triangle) {
     const UVec3 t = data_->triangles[triangle];
-    const Vec3 a = data_->positions[t.x] - around.point, b = data_->positions[t.y] - around.point, c = data_->positions[t.z] - around.point;
+    const Vec3 a = data_->positions[t.x] - around.point, b = data_->positions[t.y] - around.point,
+               c = data_->positions[t.z] - around.point;
     const Vec3 normal = glm::cross(b - a, c - a);
     const float agreement = glm::dot(normal, around.normal) * side;
-    const float ha = glm::dot(a, around.normal) * scale, hb = glm::dot(b, around.normal) * scale, hc = glm::dot(c, around.normal) * scale;
+    const float ha = glm::dot(a, around.normal) * scale, hb = glm::dot(b, around.normal) * scale,
+                hc = glm::dot(c, around.normal) * scale;
     const LocalTriangle local{{{glm::dot(a, coverage.s), glm::dot(a, coverage.t), ha},
                                {glm::dot(b, coverage.s), glm::dot(b, coverage.t), hb},
                                {glm::dot(c, coverage.s), glm::dot(c, coverage.t), hc}}};
@@ -436,12 +441,9 @@ void SurfaceArea::measure(const Neighbourhood& around, float radius, PhotonKerne
                           TriangleFilter filter) const {
   const auto fits = [&](float r) {
     switch (kernel) {
-      case PhotonKernel::constant:
-        return measure_with<PhotonKernel::constant>(around, r, filter, coverage);
-      case PhotonKernel::cone:
-        return measure_with<PhotonKernel::cone>(around, r, filter, coverage);
-      case PhotonKernel::parabola:
-        break;
+      case PhotonKernel::constant: return measure_with<PhotonKernel::constant>(around, r, filter, coverage);
+      case PhotonKernel::cone: return measure_with<PhotonKernel::cone>(around, r, filter, coverage);
+      case PhotonKernel::parabola: break;
     }
     return measure_with<PhotonKernel::parabola>(around, r, filter, coverage);
   };

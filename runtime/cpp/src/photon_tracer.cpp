@@ -80,9 +80,15 @@ using ParticleSource = FunctionRef<PhotonEmission(Tracer&, const SampleStream&)>
 /// The photons of a run of particles.
 class ParticleChunk {
  public:
-  ParticleChunk(Tracer& tracer, NodeId node, const ParticleSource& source, const PathAutomaton& via, const std::vector<bool>& live,
-                double count, std::vector<Photon>& hits)
-      : tracer_(tracer), scene_(tracer.scene()), node_(node), source_(source), via_(via), live_(live), share_(static_cast<float>(1 / count)),
+  ParticleChunk(Tracer& tracer, NodeId node, const ParticleSource& source, const PathAutomaton& via,
+                const std::vector<bool>& live, double count, std::vector<Photon>& hits)
+      : tracer_(tracer),
+        scene_(tracer.scene()),
+        node_(node),
+        source_(source),
+        via_(via),
+        live_(live),
+        share_(static_cast<float>(1 / count)),
         hits_(hits) {}
 
   void trace(const SampleStream& random) {
@@ -119,7 +125,8 @@ class ParticleChunk {
       const int next_state = scatter(at, random, dimension, state, sample);
       if (next_state >= 0) {
         direction = at.frame.to_world(sample.wi);
-        if (at.side_agrees(direction, sample.wi.z)) next = flux * sample.weight * adjoint_correction(at, incoming, direction, sample.wi);
+        if (at.side_agrees(direction, sample.wi.z))
+          next = flux * sample.weight * adjoint_correction(at, incoming, direction, sample.wi);
       }
       ledger_.absorbed += DVec3(flux) - DVec3(next);
       if (!(max_component(next) > 0)) break;
@@ -209,7 +216,9 @@ class ParticleChunk {
       probability = albedo[chosen] / sum;
       u = std::min(rest / albedo[chosen], kOneMinusEpsilon);
     }
-    if (!at.bsdf().sample(at.wo_local, u, random.get2(dimension + kBsdfDirection), groups[chosen].events, Carried::flux, sample)) return -1;
+    if (!at.bsdf().sample(at.wo_local, u, random.get2(dimension + kBsdfDirection), groups[chosen].events, Carried::flux,
+                          sample))
+      return -1;
     sample.weight /= probability;
     return groups[chosen].state;
   }
@@ -274,7 +283,8 @@ Photons trace_particles(PrepareContext& context, NodeId node, const ParticleSour
 
 }  // namespace
 
-Photons trace_photons(PrepareContext& context, NodeId node, const Emitters& light, const PathAutomaton& via, std::uint64_t count) {
+Photons trace_photons(PrepareContext& context, NodeId node, const Emitters& light, const PathAutomaton& via,
+                      std::uint64_t count) {
   const std::vector<bool> live = live_states(via);
   if (light.empty() || count == 0 || !live[0]) return {};
 
@@ -299,7 +309,9 @@ Photons trace_secondary_photons(PrepareContext& context, NodeId node, const Radi
   if (sources.empty()) return {};
   // Other random numbers than those of the particles' ways, for the source may use any of them.
   const std::uint32_t key = stream_key(context, node, 0x7365636fu);
-  const auto emit = [&](Tracer& tracer, const SampleStream& random) { return sources.emit(tracer, SampleStream(key, random.index())); };
+  const auto emit = [&](Tracer& tracer, const SampleStream& random) {
+    return sources.emit(tracer, SampleStream(key, random.index()));
+  };
   return trace_particles(context, node, emit, via, live, count);
 }
 

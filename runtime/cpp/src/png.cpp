@@ -19,7 +19,8 @@ namespace ln {
 
 std::vector<unsigned char> png_bytes(int width, int height, std::span<const unsigned char> rgb) {
   int size = 0;
-  const std::unique_ptr<unsigned char, decltype(&std::free)> png(stbi_write_png_to_mem(rgb.data(), 3 * width, width, height, 3, &size), &std::free);
+  const std::unique_ptr<unsigned char, decltype(&std::free)> png(
+      stbi_write_png_to_mem(rgb.data(), 3 * width, width, height, 3, &size), &std::free);
   if (!png) throw std::bad_alloc();
   return {png.get(), png.get() + size};
 }

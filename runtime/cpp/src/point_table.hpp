@@ -22,11 +22,12 @@ struct PointTable {
   std::vector<Column> columns;
   std::size_t rows = 0;
   FunctionRef<void(std::size_t row, std::vector<double>& values)> fill;  // appends a value a column
-  FunctionRef<Color(std::size_t row)> colour;                           // linear, of any brightness; for PLY only
+  FunctionRef<Color(std::size_t row)> colour;                            // linear, of any brightness; for PLY only
 };
 
-/// Writes the file of a tap, by its suffix. In a PLY (binary, little endian) each point has an sRGB colour, too, with an exposure that
-/// makes the mean of the largest channels half of white. Numbers of a CSV tell any two floats apart. Throws Error.
+/// Writes the file of a tap, by its suffix. In a PLY (binary, little endian) each point has an sRGB colour, too, with an
+/// exposure that makes the mean of the largest channels half of white. Numbers of a CSV tell any two floats apart. Throws
+/// Error.
 void write_points(const TapFile& tap, const PointTable& table);
 
 }  // namespace ln

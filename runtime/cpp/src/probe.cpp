@@ -46,7 +46,8 @@ Hit surface_at(Tracer& tracer, const Vec3& position, const Vec3& normal) {
 
 Probe::Probe(const ProbeInfo& info) : info_(info), file_(read_sensors(info.sensors)) {
   constexpr std::size_t kMost = std::size_t{1} << 28;
-  if (file_.sensors.size() > kMost) throw Error(printable(file_.path) + ": holds more sensors than the 268 million that a probe may have");
+  if (file_.sensors.size() > kMost)
+    throw Error(printable(file_.path) + ": holds more sensors than the 268 million that a probe may have");
 }
 
 void Probe::place(Tracer& tracer) {
@@ -97,12 +98,15 @@ void Probe::write(Units units) const {
     const double mean[3] = {sum.irradiance[0] / n, sum.irradiance[1] / n, sum.irradiance[2] / n};
     const double illuminance = factor * (0.2126 * mean[0] + 0.7152 * mean[1] + 0.0722 * mean[2]);
     line = file_.sensors[i].row;
-    for (const double value : {mean[0], mean[1], mean[2], illuminance, factor * sum.standard_error()}) line += "," + value_text(value);
+    for (const double value : {mean[0], mean[1], mean[2], illuminance, factor * sum.standard_error()})
+      line += "," + value_text(value);
     out.write(line + "\n");
     broken += sum.broken;
   }
   out.commit();
-  if (broken > 0) warning(std::string(info_.file) + ": " + std::to_string(broken) + " samples were not finite; they count as black. This is a fault of an operator or of the scene's values");
+  if (broken > 0)
+    warning(std::string(info_.file) + ": " + std::to_string(broken) +
+            " samples were not finite; they count as black. This is a fault of an operator or of the scene's values");
 }
 
 }  // namespace ln

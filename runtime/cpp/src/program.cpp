@@ -73,7 +73,8 @@ void check_files(const std::vector<NamedFile>& names) {
   for (const NamedFile& a : names) {
     for (const NamedFile& b : names) {
       if (&a >= &b || !(a.is_output || b.is_output) || a.path.empty() || b.path.empty()) continue;
-      if (same_file(a.path, b.path)) throw UsageError(std::string(a.option) + " and " + b.option + " are the same file, '" + b.path + "'");
+      if (same_file(a.path, b.path))
+        throw UsageError(std::string(a.option) + " and " + b.option + " are the same file, '" + b.path + "'");
     }
   }
   for (const NamedFile& file : names)
@@ -88,8 +89,8 @@ RenderLimits limits_of(const Options& options, double prepare_seconds) {
 
 std::string comparison_text(const Comparison& found) {
   char text[160];
-  std::snprintf(text, sizeof text, "relMSE %.4g, RMSE %.4g, mean %.4g (bias %.3g %%), largest difference %.4g", found.rel_mse, found.rmse,
-                found.mean, 100 * found.bias, found.largest);
+  std::snprintf(text, sizeof text, "relMSE %.4g, RMSE %.4g, mean %.4g (bias %.3g %%), largest difference %.4g", found.rel_mse,
+                found.rmse, found.mean, 100 * found.bias, found.largest);
   return text;
 }
 
@@ -101,11 +102,13 @@ ExrMetadata metadata_of(const Options& options, const RenderOutcome& outcome, co
                        {"units", std::string(options.units == Units::photometric ? "photometric" : "radiometric")}};
   if (!options.camera.empty()) metadata.emplace_back("camera", options.camera);
   if (!options.environment_path.empty()) metadata.emplace_back("environment", base_name(options.environment_path));
-  if (outcome.most_samples != outcome.samples) metadata.emplace_back("samplesMost", static_cast<std::int32_t>(outcome.most_samples));
+  if (outcome.most_samples != outcome.samples)
+    metadata.emplace_back("samplesMost", static_cast<std::int32_t>(outcome.most_samples));
   std::string sets;
   for (const std::string& set : options.sets) sets += (sets.empty() ? "" : " ") + set;
   if (!sets.empty()) metadata.emplace_back("parameters", sets);
-  for (const DifferenceStats& each : stats.differences) metadata.emplace_back("difference." + each.name, comparison_text(each.found));
+  for (const DifferenceStats& each : stats.differences)
+    metadata.emplace_back("difference." + each.name, comparison_text(each.found));
   return metadata;
 }
 
@@ -134,9 +137,11 @@ class Preview {
 std::string summary(const Options& options, const ProgramInfo& program, const RenderOutcome& outcome, const Stats& stats) {
   std::string text;
   if (program.has_image) text = options.output + ": " + std::to_string(stats.width) + "x" + std::to_string(stats.height) + ", ";
-  text += std::to_string(outcome.samples) + (outcome.most_samples > outcome.samples ? " or more sample" : " sample") + (outcome.samples == 1 ? "" : "s");
+  text += std::to_string(outcome.samples) + (outcome.most_samples > outcome.samples ? " or more sample" : " sample") +
+          (outcome.samples == 1 ? "" : "s");
   char numbers[80];
-  int used = std::snprintf(numbers, sizeof numbers, " a %s, %.2f s", program.uses_camera() ? "pixel" : "point", stats.seconds.total);
+  int used =
+      std::snprintf(numbers, sizeof numbers, " a %s, %.2f s", program.uses_camera() ? "pixel" : "point", stats.seconds.total);
   if (stats.seconds.render > 0 && stats.rays.total > 0) {
     const double rate = static_cast<double>(stats.rays.total) / (stats.seconds.prepare + stats.seconds.render) * 1e-6;
     std::snprintf(numbers + used, sizeof numbers - static_cast<std::size_t>(used), ", %.2f million rays/s", rate);
@@ -147,7 +152,8 @@ std::string summary(const Options& options, const ProgramInfo& program, const Re
 void report_repairs(const Film& film) {
   const std::uint64_t count = film.non_finite_samples() + film.negative_samples();
   if (count == 0) return;
-  warning(std::to_string(film.non_finite_samples()) + " samples were not finite and " + std::to_string(film.negative_samples()) +
+  warning(std::to_string(film.non_finite_samples()) + " samples were not finite and " +
+          std::to_string(film.negative_samples()) +
           " were negative; they count as black. This is a fault of an operator or of the scene's values");
 }
 
@@ -169,8 +175,8 @@ RenderOutcome render_picture(RunContext& context, RunCallbacks& callbacks, const
   std::function<void(const Film&)> between_passes;
   if (has_image && !options.preview_path.empty()) between_passes = [&](const Film& present) { preview.try_write(present); };
   const RenderOutcome outcome = render_passes(
-      film, limits, context.workers, context.progress, [&](const Tile& tile, Film& target) { callbacks.render_tile(tile, target); },
-      between_passes, kPreviewInterval);
+      film, limits, context.workers, context.progress,
+      [&](const Tile& tile, Film& target) { callbacks.render_tile(tile, target); }, between_passes, kPreviewInterval);
   if (outcome.most_samples == 0) throw Interrupted{};
   if (outcome.error) context.stats.error_estimate = outcome.error->rel_mse;
   context.stats.repaired_samples = film.non_finite_samples() + film.negative_samples();
@@ -191,7 +197,8 @@ RenderOutcome render_picture(RunContext& context, RunCallbacks& callbacks, const
 int render_program(const Options& options, const ProgramInfo& program, RunCallbacks& callbacks, Progress& progress) {
   if (!options.print_letters && !options.verify_paths) check_files(files_of(options, program));
   for (const char* option : options.unused)
-    note(std::string(option) + " is not used: " + (options.verify_paths ? "--verify-paths writes no files" : "this network has nothing for it"));
+    note(std::string(option) +
+         " is not used: " + (options.verify_paths ? "--verify-paths writes no files" : "this network has nothing for it"));
 
   Workers workers(options.threads);
   Stats stats;

@@ -2,8 +2,10 @@
 
 #include <sys/ioctl.h>
 #include <unistd.h>
+#include <atomic>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
@@ -22,6 +24,7 @@ constexpr double kBarInterval = 0.1, kJsonInterval = 0.5, kPlainInterval = 5;  /
 /// Guards the terminal and `present`. Recursive calls do not occur.
 std::mutex mutex;
 Progress* present = nullptr;
+std::atomic<int> notes_off = 0;
 
 /// Straight to the descriptor: nothing is buffered when a program ends in a hurry. What cannot be said is not said.
 void put(std::string_view text) {
@@ -139,7 +142,12 @@ void say(std::string_view kind, std::string_view message) {
   put(one_line(std::string(kind) + ": " + std::string(message)) + "\n");
 }
 
-void note(std::string_view message) { say("note", message); }
+void note(std::string_view message) {
+  if (notes_off == 0) say("note", message);
+}
+NotesOff::NotesOff() { ++notes_off; }
+NotesOff::~NotesOff() { --notes_off; }
+
 void warning(std::string_view message) { say("warning", message); }
 
 void note_skipped(std::string_view node, std::string_view reason) {
@@ -171,11 +179,11 @@ void progress_heartbeat() {
 }
 
 Progress::Progress(ProgressMode mode)
-    : form_(mode == ProgressMode::none      ? Form::none
-            : mode == ProgressMode::json    ? Form::json
-            : mode == ProgressMode::plain   ? Form::plain
-            : is_terminal()                 ? Form::bar
-                                            : Form::plain) {
+    : form_(mode == ProgressMode::none    ? Form::none
+            : mode == ProgressMode::json  ? Form::json
+            : mode == ProgressMode::plain ? Form::plain
+            : is_terminal()               ? Form::bar
+                                          : Form::plain) {
   const std::lock_guard lock(mutex);
   present = this;
 }
@@ -254,7 +262,8 @@ void Progress::show(double now) {
   if (known) {
     constexpr int kLength = 30;
     const int filled = static_cast<int>(std::lround(fraction * kLength));
-    line += " [" + std::string(static_cast<std::size_t>(filled), '#') + std::string(static_cast<std::size_t>(kLength - filled), '-') + "] " + percent;
+    line += " [" + std::string(static_cast<std::size_t>(filled), '#') +
+            std::string(static_cast<std::size_t>(kLength - filled), '-') + "] " + percent;
   }
   line += "  " + facts;
   const auto width = static_cast<std::size_t>(std::max(terminal_width() - 1, 10));

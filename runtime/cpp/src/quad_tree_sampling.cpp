@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "ln/diffuse_surface.hpp"
+#include "ln/distribution.hpp"
 
 namespace ln {
 
@@ -184,15 +185,12 @@ class Sampler {
   float mean_square() {
     constexpr std::uint32_t kCells = 1024;
     if (ids_.empty()) return 0;
-    std::vector<double> area_up_to;
-    for (const std::uint32_t face : ids_)
-      area_up_to.push_back((area_up_to.empty() ? 0 : area_up_to.back()) +
-                           static_cast<double>(area(patches_->surface(face / 2))));
+    std::vector<double> areas;
+    for (const std::uint32_t face : ids_) areas.push_back(static_cast<double>(area(patches_->surface(face / 2))));
+    const Distribution by_area(areas);
     std::vector<Color> means(kCells);
     context_.parallel_for(kCells, [&](Tracer& tracer, std::size_t i) {
-      const double target = area_up_to.back() * (static_cast<double>(i) + 0.5) / kCells;
-      const auto at = std::min(std::upper_bound(area_up_to.begin(), area_up_to.end(), target), area_up_to.end() - 1);
-      const std::uint32_t face = ids_[static_cast<std::size_t>(at - area_up_to.begin())];
+      const std::uint32_t face = ids_[by_area.sample((static_cast<float>(i) + 0.5f) / kCells).index];
       DomainCell cell = patches_->domain(face / 2);
       Vec2 st = cell.point(sobol_point(key_, 0, static_cast<std::uint32_t>(i)));
       for (int depth = first_depth(face); depth > 0; --depth) cell = cell.child(descend(cell.quad, st));

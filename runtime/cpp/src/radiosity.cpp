@@ -14,8 +14,8 @@ namespace radiosity {
 
 namespace {
 
-/// Light goes from `source` to `receiver`. Between elements as radiosity * factor * visibility of each quarter of the source, the
-/// same all over the receiver; with a cluster, faces count with their own normals as if each were at the cluster's center.
+/// Light goes from `source` to `receiver`. Between elements as radiosity * factor * visibility of each quarter of the source,
+/// the same all over the receiver; with a cluster, faces count with their own normals as if each were at the cluster's center.
 struct Link {
   NodeRef receiver, source;
   float factor[4] = {};  // form factors of the source's quarters without occlusion, between elements
@@ -436,7 +436,8 @@ class Solver {
     for (std::size_t i = 0; i < sums.size(); ++i) {
       const Face& face = face_of(static_cast<NodeRef>(i));
       if (face.enclosed()) continue;
-      const float sum = sums[shape_.elements[i].face].x, variance = (1 - face.seen()) / std::max(1.0f, static_cast<float>(face.hits));
+      const float sum = sums[shape_.elements[i].face].x,
+                  variance = (1 - face.seen()) / std::max(1.0f, static_cast<float>(face.hits));
       const float trust = sqr(kErrorOfSums) / (sqr(kErrorOfSums) + variance);
       const float own = sum > 0 ? face.seen() / sum / all : 1.0f;
       correction_[i] = std::clamp(all * (1 + trust * (own - 1)), 1 / kLargestCorrection, kLargestCorrection);

@@ -54,10 +54,11 @@ struct Splat {
 
 class ReferencePaths {
  public:
-  ReferencePaths(const Scene& scene, const PathLanguage& language) : scene_(scene), language_(language), emitters_(scene, language) {
-    has_specular_beginnings_ =
-        letters_of(scene, {}).kinds[LetterSet::specular] != 0 &&
-        std::any_of(emitters_.all().begin(), emitters_.all().end(), [&](const EmitterClass& c) { return c.delta && language.after(0, c.letter) >= 0; });
+  ReferencePaths(const Scene& scene, const PathLanguage& language)
+      : scene_(scene), language_(language), emitters_(scene, language) {
+    has_specular_beginnings_ = letters_of(scene, {}).kinds[LetterSet::specular] != 0 &&
+                               std::any_of(emitters_.all().begin(), emitters_.all().end(),
+                                           [&](const EmitterClass& c) { return c.delta && language.after(0, c.letter) >= 0; });
   }
 
   /// Are there paths L@delta S ...?
@@ -117,10 +118,12 @@ class ReferencePaths {
           Color f_cos(0);
           for (int e = 0; e < kEventCount; ++e) {
             const int next = is_smooth(at, e) ? language_.after(a.state, language_.event(e, scene_.part_tags(at.part))) : -1;
-            if (next >= 0 && language_.after(next, language_.eye()) >= 0) f_cos += scattered(at, view->direction, e, Carried::flux);
+            if (next >= 0 && language_.after(next, language_.eye()) >= 0)
+              f_cos += scattered(at, view->direction, e, Carried::flux);
           }
           if (!is_black(f_cos) && is_visible(tracer, kParticles, at, view->end, random))
-            splat(view->pixel, a.flux * f_cos * (view->importance * arrival_factor(at) * departure_factor(at, view->direction)));
+            splat(view->pixel,
+                  a.flux * f_cos * (view->importance * arrival_factor(at) * departure_factor(at, view->direction)));
         }
         return kAllEvents;
       });
@@ -152,8 +155,8 @@ class ReferencePaths {
   }
 
   /// Light from a sample of each class of emitters.
-  Color light_samples(Tracer& tracer, const Interaction& at, const States (&before)[kEventCount], const std::array<float, kEventCount>& probabilities,
-                      Random& random) const {
+  Color light_samples(Tracer& tracer, const Interaction& at, const States (&before)[kEventCount],
+                      const std::array<float, kEventCount>& probabilities, Random& random) const {
     Color result(0);
     for (const EmitterClass& source : emitters_.all()) {
       if (language_.after(0, source.letter) < 0) continue;
@@ -163,7 +166,8 @@ class ReferencePaths {
       Color f_cos(0);
       for (int e = 0; e < kEventCount; ++e) {
         if (!is_smooth(at, e) || !begins(source, before[e])) continue;
-        const float by_bsdf = source.delta ? 0 : probabilities[e] * at.bsdf().pdf_w(at.wo_local, at.frame.to_local(light.wi), kEvents[e]);
+        const float by_bsdf =
+            source.delta ? 0 : probabilities[e] * at.bsdf().pdf_w(at.wo_local, at.frame.to_local(light.wi), kEvents[e]);
         f_cos += scattered(at, light.wi, e, Carried::radiance) * balance(light.pdf_w, by_bsdf);
       }
       if (is_black(f_cos)) continue;
@@ -191,7 +195,8 @@ class ReferencePaths {
     return result;
   }
 
-  Color connect(Tracer& tracer, const Interaction& x, const States (&before)[kEventCount], const ParticleVertex& vertex, Random& random) const {
+  Color connect(Tracer& tracer, const Interaction& x, const States (&before)[kEventCount], const ParticleVertex& vertex,
+                Random& random) const {
     const Interaction y(scene_, vertex.ray, vertex.hit);
     const Vec3 d = x.at.p - y.at.p;
     const float squared = glm::dot(d, d);
@@ -217,7 +222,8 @@ class ReferencePaths {
 
 class ReferenceProgram final : public NetworkRun {
  public:
-  ReferenceProgram(const ProgramInfo& program, const PathLanguage& language, std::span<const TagRule> tags, const std::int64_t& particles)
+  ReferenceProgram(const ProgramInfo& program, const PathLanguage& language, std::span<const TagRule> tags,
+                   const std::int64_t& particles)
       : NetworkRun(program, tags), language_(language), particles_(particles) {}
 
   void render_tile(const Tile& tile, Film& film) override {
@@ -245,7 +251,9 @@ class ReferenceProgram final : public NetworkRun {
   }
 
  private:
-  std::size_t pixel_index(int x, int y) const { return static_cast<std::size_t>(y) * static_cast<std::size_t>(size().width) + static_cast<std::size_t>(x); }
+  std::size_t pixel_index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(size().width) + static_cast<std::size_t>(x);
+  }
 
   /// Adds the particles up in the order of their numbers, a batch after the other, so that threads do not matter.
   void trace_particles(PrepareContext& context) {
@@ -261,7 +269,9 @@ class ReferenceProgram final : public NetworkRun {
           Random random(key, first + i);
           paths_->trace_to_camera(tracer, camera(), random, [&](const Vec2& position, const Color& value) {
             const Vec2 corner = glm::floor(position);
-            if (corner.x < 0 || corner.y < 0 || corner.x >= static_cast<float>(size().width) || corner.y >= static_cast<float>(size().height)) return;
+            if (corner.x < 0 || corner.y < 0 || corner.x >= static_cast<float>(size().width) ||
+                corner.y >= static_cast<float>(size().height))
+              return;
             chunks[begin / kChunk].push_back({pixel_index(static_cast<int>(corner.x), static_cast<int>(corner.y)), value});
           });
         }
@@ -282,15 +292,17 @@ class ReferenceProgram final : public NetworkRun {
 
 int run_reference(int argc, char** argv, const char* text, const PathLanguage& paths, std::span<const TagRule> tags) {
   std::int64_t particles = 1'000'000;
-  const ParameterSlot parameters[] = {{.node = "particles",
-                                       .name = "count",
-                                       .kind = ParameterKind::count,
-                                       .value = &particles,
-                                       .minimum = 1,
-                                       .maximum = 1e12,
-                                       .summary = "Particles from each kind of delta emitter, for paths L@delta S ... (D|G) E."}};
+  const ParameterSlot parameters[] = {
+      {.node = "particles",
+       .name = "count",
+       .kind = ParameterKind::count,
+       .value = &particles,
+       .minimum = 1,
+       .maximum = 1e12,
+       .summary = "Particles from each kind of delta emitter, for paths L@delta S ... (D|G) E."}};
   const NodeInfo nodes[] = {{.name = "image", .op = "Image", .line = 0}, {.name = "particles", .op = "Particles", .line = 0}};
-  const ProgramInfo program = {.network = "reference", .source_file = "", .image_paths = text, .parameters = parameters, .nodes = nodes};
+  const ProgramInfo program = {
+      .network = "reference", .source_file = "", .image_paths = text, .parameters = parameters, .nodes = nodes};
   ReferenceProgram run(program, paths, tags, particles);
   return run_program(argc, argv, program, run);
 }

@@ -13,8 +13,10 @@ EmitterClasses::EmitterClasses(const Scene& scene, const PathLanguage& letters) 
     const auto [entry, is_new] = found.try_emplace(letter, -1);
     if (!is_new) return entry->second;
     EmitterSelection selection;
-    for (std::uint32_t i = 0; i < data.parts.size(); ++i) selection.parts.push_back(letter == letters.emitter(false, scene.part_tags(i)));
-    for (std::size_t i = 0; i < data.lights.size(); ++i) selection.lights.push_back(letter == letters.emitter(true, scene.light_tags(i)));
+    for (std::uint32_t i = 0; i < data.parts.size(); ++i)
+      selection.parts.push_back(letter == letters.emitter(false, scene.part_tags(i)));
+    for (std::size_t i = 0; i < data.lights.size(); ++i)
+      selection.lights.push_back(letter == letters.emitter(true, scene.light_tags(i)));
     std::unique_ptr<Emitters> emitters = scene.selected_emitters(selection, letter == letters.emitter(false, 0));
     if (emitters->empty()) return -1;
     entry->second = static_cast<int>(classes_.size());
@@ -40,7 +42,8 @@ std::array<float, kEventCount> event_probabilities(const Interaction& at, const 
   return probabilities;
 }
 
-Scattering scatter(const Interaction& at, const std::array<float, kEventCount>& probabilities, Carried carried, Random& random) {
+Scattering scatter(const Interaction& at, const std::array<float, kEventCount>& probabilities, Carried carried,
+                   Random& random) {
   Scattering result;
   float u = random.get1();
   int event = -1;
@@ -69,6 +72,8 @@ Color scattered(const Interaction& at, const Vec3& w, int event, Carried carried
 
 float arrival_factor(const Interaction& at) { return at.wo_local.z / std::abs(glm::dot(at.wo, at.at.ng)); }
 
-float departure_factor(const Interaction& at, const Vec3& w) { return std::abs(glm::dot(w, at.at.ng) / glm::dot(w, at.frame.n)); }
+float departure_factor(const Interaction& at, const Vec3& w) {
+  return std::abs(glm::dot(w, at.at.ng) / glm::dot(w, at.frame.n));
+}
 
 }  // namespace ln

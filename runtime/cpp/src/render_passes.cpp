@@ -12,8 +12,8 @@ namespace ln {
 
 namespace {
 
-constexpr double kLongestPass = 10;         // [s]
-constexpr double kPatience = 1;             // after an interrupt, for the end of a pass [s]
+constexpr double kLongestPass = 10;            // [s]
+constexpr double kPatience = 1;                // after an interrupt, for the end of a pass [s]
 constexpr std::uint32_t kSamplesToTrust = 16;  // before an estimate of the error may end the render
 constexpr double kStandardErrors = 2;
 
@@ -39,7 +39,8 @@ std::vector<Tile> make_tiles(int width, int height, int workers) {
   for (int row0 = 0; row0 < rows; row0 += kSquare) {
     for (int column0 = 0; column0 < columns; column0 += kSquare) {
       for (std::uint32_t code = 0; code < kSquare * kSquare; ++code) {
-        const int column = column0 + static_cast<int>(compact_bits(code)), row = row0 + static_cast<int>(compact_bits(code >> 1));
+        const int column = column0 + static_cast<int>(compact_bits(code)),
+                  row = row0 + static_cast<int>(compact_bits(code >> 1));
         if (column >= columns || row >= rows) continue;
         Tile tile;
         tile.x0 = column * side;
@@ -86,7 +87,9 @@ class Pass final : public PassControl {
   double seconds() const { return watch_.seconds(); }
 
  private:
-  double fraction() const { return static_cast<double>(tiles_done_.load(std::memory_order_relaxed)) / static_cast<double>(tiles_.size()); }
+  double fraction() const {
+    return static_cast<double>(tiles_done_.load(std::memory_order_relaxed)) / static_cast<double>(tiles_.size());
+  }
 
   bool give_up(bool give_up) const {
     if (give_up) stop_.store(true, std::memory_order_relaxed);
@@ -158,9 +161,7 @@ class PassPlan {
     return std::min(fraction, 1.0);
   }
 
-  std::optional<double> present_error() const {
-    return limits_.error ? std::optional(estimate_.rel_mse) : std::nullopt;
-  }
+  std::optional<double> present_error() const { return limits_.error ? std::optional(estimate_.rel_mse) : std::nullopt; }
   const ErrorEstimate& estimate() const { return estimate_; }
 
  private:

@@ -49,7 +49,8 @@ bool has_emitter(const SceneData& data) {
   for (const Part& part : data.parts) {
     const Material& m = data.materials[part.material];
     if (part.triangle_count == 0 || !m.emits()) continue;
-    if (!m.emissive_texture || max_component(m.emission * Color(color_range(data.images[m.emissive_texture.image]).high)) > 0) return true;
+    if (!m.emissive_texture || max_component(m.emission * Color(color_range(data.images[m.emissive_texture.image]).high)) > 0)
+      return true;
   }
   return false;
 }
@@ -89,11 +90,12 @@ void PrepareStep::operator()(NodeId node, FunctionRef<void(PrepareContext&)> wor
 
 void PrepareStep::claim(const std::string& file, NodeId cache) {
   std::error_code ignored;
-  const auto [place, is_new] = files_.emplace(std::filesystem::weakly_canonical(std::filesystem::absolute(file, ignored), ignored), cache);
+  const auto [place, is_new] =
+      files_.emplace(std::filesystem::weakly_canonical(std::filesystem::absolute(file, ignored), ignored), cache);
   if (is_new) return;
   const std::string one = run_.program.nodes[place->second].name, other = run_.program.nodes[cache].name;
-  throw Error(printable(file) + ": '" + one + "' and '" + other + "' are to be kept in this one file: give one of them another by --set " + other +
-              ".file=NAME");
+  throw Error(printable(file) + ": '" + one + "' and '" + other +
+              "' are to be kept in this one file: give one of them another by --set " + other + ".file=NAME");
 }
 
 CacheKey PrepareStep::cache_key(const char* network, const char* code, std::initializer_list<const char*> nodes) {
@@ -103,7 +105,8 @@ CacheKey PrepareStep::cache_key(const char* network, const char* code, std::init
   key.code.add(std::string_view(code));
   for (const ParameterSlot& slot : run_.program.parameters) {
     const auto same = [&](const char* name) { return std::string_view(name) == slot.node; };
-    if (std::any_of(nodes.begin(), nodes.end(), same)) key.network.add(std::string(slot.node) + "." + slot.name + "=" + parameter_text(slot));
+    if (std::any_of(nodes.begin(), nodes.end(), same))
+      key.network.add(std::string(slot.node) + "." + slot.name + "=" + parameter_text(slot));
   }
   return key;
 }
@@ -159,16 +162,19 @@ PictureSize NetworkRun::load(RunContext& context) {
 }
 
 void NetworkRun::build(RunContext& context) {
-  scene_ = std::make_unique<Scene>(std::move(data_), tags_, context.workers.count(), has_environment_ ? &environment_ : nullptr);
+  scene_ =
+      std::make_unique<Scene>(std::move(data_), tags_, context.workers.count(), has_environment_ ? &environment_ : nullptr);
   for (std::size_t i = 0; i < tags_.size(); ++i) {
     const int tag = tags_[i].tag;
     const bool first = i == 0 || tags_[i - 1].tag != tag;
-    if (first && scene_->tag_matches(tag) == 0) warning("LN0501: tag " + std::string(tags_[i].name) + " matches nothing in this scene");
+    if (first && scene_->tag_matches(tag) == 0)
+      warning("LN0501: tag " + std::string(tags_[i].name) + " matches nothing in this scene");
   }
   skip_dark_nodes(context.options.verify_paths);
   seed_hash_ = hash32(static_cast<std::uint32_t>(context.options.seed), static_cast<std::uint32_t>(context.options.seed >> 32));
   prepare_seconds_.assign(program_.nodes.size(), 0);
-  for (int i = 0; i < context.workers.count(); ++i) tracers_.emplace_back(*scene_, program_.nodes.size(), program_.layers.size());
+  for (int i = 0; i < context.workers.count(); ++i)
+    tracers_.emplace_back(*scene_, program_.nodes.size(), program_.layers.size());
   for (Probe& probe : probes_) probe.place(tracer(0));
   for (Lightmap& lightmap : lightmaps_) lightmap.lay_out(scene_->data(), context.options.lightmap_side);
   const View view{camera_, size_.width, size_.height, [this] { return measured_places(); }};
@@ -216,14 +222,17 @@ RenderOutcome NetworkRun::measure(RunContext& context, const RenderLimits& limit
     RenderLimits own = limits;
     if (is_probe && context.options.default_samples) own.samples = kDefaultProbeSamples;
     // What follows gets its share of the time.
-    if (own.seconds) *own.seconds = (*own.seconds - all.seconds) / static_cast<double>(count - i + (program_.uses_camera() ? 1 : 0));
+    if (own.seconds)
+      *own.seconds = (*own.seconds - all.seconds) / static_cast<double>(count - i + (program_.uses_camera() ? 1 : 0));
     Film film(is_probe ? probes_[i].size() : lightmaps_[map].side(), is_probe ? 1 : lightmaps_[map].side(), 0,
               program_.subtracts ? Film::Samples::signed_values : Film::Samples::positive);
     const RenderOutcome outcome = render_passes(film, own, context.workers, context.progress,
                                                 [&](const Tile& tile, Film& target) { measure_tile(i, tile, target); });
     if (outcome.samples == 0) throw Interrupted{};
-    if (is_probe) probes_[i].write(context.options.units);
-    else lightmaps_[map].write(film, program_.network, scene_->data());
+    if (is_probe)
+      probes_[i].write(context.options.units);
+    else
+      lightmaps_[map].write(film, program_.network, scene_->data());
     const double seconds = all.seconds + outcome.seconds;
     all = outcome;
     all.seconds = seconds;
@@ -233,10 +242,13 @@ RenderOutcome NetworkRun::measure(RunContext& context, const RenderLimits& limit
 
 bool NetworkRun::verify(RunContext& context) {
   const Options& options = context.options;
-  Verification verification(*scene_, program_, tags_, options.default_samples ? Verification::kDefaultSamples : *options.samples);
+  Verification verification(*scene_, program_, tags_,
+                            options.default_samples ? Verification::kDefaultSamples : *options.samples);
   for (std::uint32_t batch = 0; batch < Verification::kBatches; ++batch) {
     PrepareContext prepare(*scene_, context.workers, options.seed * Verification::kBatches + batch, program_.nodes.size(),
                            View{camera_, size_.width, size_.height});
+    std::optional<NotesOff> quiet;
+    if (batch > 0) quiet.emplace();
     PrepareStep step(prepare, context, prepare_seconds_, nullptr, false);
     prepare_network(step);
     context.progress.phase("verify");
@@ -245,8 +257,9 @@ bool NetworkRun::verify(RunContext& context) {
     verification.end_batch();
   }
   const VerificationReport report = verification.report();
-  context.progress.finish(report.deviating_wires == 0 ? "every wire carries the light of its paths"
-                                                      : std::to_string(report.deviating_wires) + " wires deviate from their light paths");
+  context.progress.finish(report.deviating_wires == 0
+                              ? "every wire carries the light of its paths"
+                              : std::to_string(report.deviating_wires) + " wires deviate from their light paths");
   std::fputs(report.table.c_str(), stdout);
   if (std::fflush(stdout) != 0) throw Error("the table cannot be written");
   return report.deviating_wires == 0;
@@ -269,8 +282,8 @@ void NetworkRun::write_pictures(const Film& film) const {
         rgb.insert(rgb.end(), {c.x, c.y, c.z});
       }
     }
-    write_exr(layer.file, film.width(), film.height(), rgb.data(), {{"network", program_.network}, {"lightPaths", layer.light_paths}},
-              layer.is_signed);
+    write_exr(layer.file, film.width(), film.height(), rgb.data(),
+              {{"network", program_.network}, {"lightPaths", layer.light_paths}}, layer.is_signed);
   }
 }
 
@@ -299,8 +312,9 @@ void NetworkRun::collect(Stats& stats) {
   stats.scene_file = scene_file_;
   if (!scene_) return;
   const SceneData& data = scene_->data();
-  stats.scene_counts = {{"triangles", data.triangles.size()}, {"vertices", data.positions.size()}, {"parts", data.parts.size()},
-                        {"materials", data.materials.size()}, {"images", data.images.size()},      {"lights", data.lights.size()},
+  stats.scene_counts = {{"triangles", data.triangles.size()}, {"vertices", data.positions.size()},
+                        {"parts", data.parts.size()},         {"materials", data.materials.size()},
+                        {"images", data.images.size()},       {"lights", data.lights.size()},
                         {"cameras", data.cameras.size()},     {"emitters", scene_->emitters().size()}};
 }
 

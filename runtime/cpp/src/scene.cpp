@@ -127,8 +127,9 @@ Scene::Scene(SceneData data, std::span<const TagRule> tags, int threads, const I
 }
 
 std::unique_ptr<Emitters> Scene::selected_emitters(const TagSelection& from) const {
-  return std::make_unique<Emitters>(data_, from(0) ? environment_ : nullptr, [&](std::size_t part) { return from(part_tags_[part]); },
-                                    [&](std::size_t light) { return from(light_tags_[light]); });
+  return std::make_unique<Emitters>(
+      data_, from(0) ? environment_ : nullptr, [&](std::size_t part) { return from(part_tags_[part]); },
+      [&](std::size_t light) { return from(light_tags_[light]); });
 }
 
 std::unique_ptr<Emitters> Scene::selected_emitters(const EmitterSelection& selection, bool with_environment) const {

@@ -17,7 +17,8 @@ constexpr double kSafeShare = 0.2;
 
 }  // namespace
 
-SecondarySources::SecondarySources(PrepareContext& context, const RadianceSource& source, std::uint32_t key, std::uint64_t pilots)
+SecondarySources::SecondarySources(PrepareContext& context, const RadianceSource& source, std::uint32_t key,
+                                   std::uint64_t pilots)
     : source_(&source), patches_(context.scene().data()) {
   add_cells(context.scene(), std::clamp<std::uint64_t>(pilots / kPilotsPerCell, 64, 1 << 16));
 

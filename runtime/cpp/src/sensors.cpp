@@ -67,7 +67,8 @@ class Reader {
     if (!named_) {
       named_ = true;
       if (std::none_of(fields_.begin(), fields_.end(), parse_number)) return read_header();
-      if (fields_.size() != kColumns.size()) fail(count_text(fields_.size(), "value") + " without a row of names above; " + kWanted);
+      if (fields_.size() != kColumns.size())
+        fail(count_text(fields_.size(), "value") + " without a row of names above; " + kWanted);
       use_columns({kColumns.begin(), kColumns.end()});
       file_.header = "x,y,z,nx,ny,nz";
     }
@@ -86,7 +87,8 @@ class Reader {
       begin = i + 1;
     }
     if (quoted) fail("a quotation mark is not closed on its line");
-    if (fields_.size() == 1 && line.find_first_of(";\t ") != std::string_view::npos) fail(std::string("columns are separated by commas; ") + kWanted);
+    if (fields_.size() == 1 && line.find_first_of(";\t ") != std::string_view::npos)
+      fail(std::string("columns are separated by commas; ") + kWanted);
   }
 
   void read_header() {
@@ -144,16 +146,18 @@ class Reader {
     file_.sensors.push_back({DVec3(values[0], values[1], values[2]), Vec3(normal / length), line_, kept_text()});
   }
 
-  static std::string count_text(std::size_t n, const char* what) { return std::to_string(n) + " " + what + (n == 1 ? "" : "s"); }
+  static std::string count_text(std::size_t n, const char* what) {
+    return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+  }
 
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
   SensorFile file_;
   std::size_t line_ = 0;
   bool named_ = false;
-  std::vector<std::string_view> fields_;           // of the present line
+  std::vector<std::string_view> fields_;              // of the present line
   std::array<std::size_t, kColumns.size()> place_{};  // of x, y, ... among them
-  std::vector<bool> kept_;                         // by field
+  std::vector<bool> kept_;                            // by field
 };
 
 }  // namespace

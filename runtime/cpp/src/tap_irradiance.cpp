@@ -27,7 +27,8 @@ struct ColouredMesh {
 
   void triangle(std::uint32_t i, std::uint32_t j, std::uint32_t k) {
     indices.insert(indices.end(), {i, j, k});
-    const auto size = static_cast<double>(0.5f * glm::length(glm::cross(positions[j] - positions[i], positions[k] - positions[i])));
+    const auto size =
+        static_cast<double>(0.5f * glm::length(glm::cross(positions[j] - positions[i], positions[k] - positions[i])));
     area += size;
     luminance += size * static_cast<double>(ln::luminance((irradiance[i] + irradiance[j] + irradiance[k]) / 3.0f));
   }
@@ -65,7 +66,9 @@ void write_glb(const TapFile& tap, const ColouredMesh (&sides)[2]) {
   writer.write(tap.info.file);
 }
 
-Vec3 lift(const SurfaceCell& patch, bool front) { return front ? Vec3(0) : -kLift * glm::normalize(glm::cross(patch.a, patch.b)); }
+Vec3 lift(const SurfaceCell& patch, bool front) {
+  return front ? Vec3(0) : -kLift * glm::normalize(glm::cross(patch.a, patch.b));
+}
 
 }  // namespace
 
@@ -97,10 +100,12 @@ void write_tap(const TapFile& tap, const TriMesh& triangles) {
     for (const MeshTriangle& t : triangles.triangles(face)) {
       std::uint32_t corners[3];
       for (int k = 0; k < 3; ++k)
-        corners[k] = mesh.vertex(patch.o + t.corner[k].x * patch.a + t.corner[k].y * patch.b + off, triangles.vertices()[t.vertex[k]]);
+        corners[k] =
+            mesh.vertex(patch.o + t.corner[k].x * patch.a + t.corner[k].y * patch.b + off, triangles.vertices()[t.vertex[k]]);
       const Vec2 a = t.corner[1] - t.corner[0], b = t.corner[2] - t.corner[0];
       const bool counter_clockwise = a.x * b.y - a.y * b.x > 0;
-      counter_clockwise == front ? mesh.triangle(corners[0], corners[1], corners[2]) : mesh.triangle(corners[0], corners[2], corners[1]);
+      counter_clockwise == front ? mesh.triangle(corners[0], corners[1], corners[2])
+                                 : mesh.triangle(corners[0], corners[2], corners[1]);
     }
   }
   write_glb(tap, sides);

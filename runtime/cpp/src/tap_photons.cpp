@@ -1,5 +1,7 @@
 // Taps of photons: point clouds and tables.
 
+#include <algorithm>
+
 #include "ln/sorted_photons.hpp"
 #include "point_table.hpp"
 
@@ -33,12 +35,10 @@ void write_tap(const TapFile& tap, const Photons& photons) {
 void write_tap(const TapFile& tap, const SortedPhotons& photons) {
   std::vector<PointTable::Column> columns = kPhotonColumns;
   columns.push_back({"surface", true});
-  std::size_t surface = 0;  // rows are asked for in order, but more than once
   const auto fill = [&](std::size_t i, std::vector<double>& values) {
-    if (i < photons.first[surface]) surface = 0;
-    while (i >= photons.first[surface + 1]) ++surface;
     add_photon(photons.hits[i], tap.scene, values);
-    values.push_back(static_cast<double>(surface));
+    values.push_back(
+        static_cast<double>(std::upper_bound(photons.first.begin(), photons.first.end(), i) - photons.first.begin() - 1));
   };
   const auto colour = [&](std::size_t i) { return flux(photons.hits[i], tap.scene); };
   const std::string units = std::string(kPhotonUnits) + "; surface 2 s: the front of sheet s, 2 s + 1: its back";

@@ -43,7 +43,8 @@ inline std::string base64(std::string_view bytes) {
   std::string out;
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
     std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < 3; ++k) bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+    for (std::size_t k = 0; k < 3; ++k)
+      bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
     for (std::size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : kAlphabet[bits >> (18 - 6 * k) & 63];
   }
   return out;
@@ -58,8 +59,8 @@ class GltfFile {
                const std::string& more = {}) {
     const int view = buffer_view(values);
     return accessor_text("{\"bufferView\":" + std::to_string(view) + ",\"componentType\":" + std::to_string(component_type) +
-                         ",\"count\":" + std::to_string(count) + ",\"type\":\"" + type + "\"" + (more.empty() ? "" : "," + more) +
-                         "}");
+                         ",\"count\":" + std::to_string(count) + ",\"type\":\"" + type + "\"" +
+                         (more.empty() ? "" : "," + more) + "}");
   }
   int floats(const std::string& type, const std::vector<float>& values) {
     const std::size_t size = type == "SCALAR" ? 1 : type == "VEC2" ? 2 : type == "VEC3" ? 3 : type == "VEC4" ? 4 : 16;

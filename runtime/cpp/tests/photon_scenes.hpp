@@ -63,10 +63,13 @@ class SceneBuilder {
   /// A closed box; the fronts look inwards, or outwards.
   void box(const Vec3& low, const Vec3& high, std::uint32_t material, bool inwards = true, int n = 1) {
     const auto corner = [&](int i) { return Vec3(i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z); };
-    const int faces[6][4] = {{0, 4, 5, 1}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}, {0, 1, 3, 2}, {4, 6, 7, 5}};  // seen from inside
+    const int faces[6][4] = {{0, 4, 5, 1}, {2, 3, 7, 6}, {0, 2, 6, 4},
+                             {1, 5, 7, 3}, {0, 1, 3, 2}, {4, 6, 7, 5}};  // seen from inside
     for (const auto& f : faces) {
-      if (inwards) quad(corner(f[0]), corner(f[1]), corner(f[2]), corner(f[3]), material, n);
-      else quad(corner(f[3]), corner(f[2]), corner(f[1]), corner(f[0]), material, n);
+      if (inwards)
+        quad(corner(f[0]), corner(f[1]), corner(f[2]), corner(f[3]), material, n);
+      else
+        quad(corner(f[3]), corner(f[2]), corner(f[1]), corner(f[0]), material, n);
     }
   }
 
@@ -165,7 +168,8 @@ struct OneSmooth {  // D|G, in two states that must be told apart
 
 /// A scene and its photons.
 struct Traced {
-  explicit Traced(const SceneData& data, std::uint64_t count, const PathAutomaton& via = path_automaton<AnyPath>(), int threads = 2)
+  explicit Traced(const SceneData& data, std::uint64_t count, const PathAutomaton& via = path_automaton<AnyPath>(),
+                  int threads = 2)
       : stage(data, threads), photons(trace_photons(stage.context, 1, stage.scene.emitters(), via, count)) {}
 
   Stage stage;
@@ -174,7 +178,8 @@ struct Traced {
 
 /// A horizontal square in one piece or `pieces` x `pieces`, at a height of 0.01.
 inline void add_floor(SceneBuilder& b, int pieces = 1) {
-  b.quad({-0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, -0.7f}, {-0.7f, 0.01f, -0.7f}, b.material(Color(0.5f)), pieces);
+  b.quad({-0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, 0.7f}, {0.7f, 0.01f, -0.7f}, {-0.7f, 0.01f, -0.7f}, b.material(Color(0.5f)),
+         pieces);
 }
 
 /// On the floor, from front to back: a wall without thickness at x = 0, and a roof from its top over all that is left of it.

@@ -47,17 +47,28 @@ struct Furnace {
 };
 
 std::vector<Furnace> white_materials() {
-  BsdfParameters metal{.metallic = 1}, plastic{}, diamond{.ior = 2.4f}, thin{.transmission = 1}, solid{.transmission = 1, .solid = true};
+  BsdfParameters metal{.metallic = 1}, plastic{}, diamond{.ior = 2.4f}, thin{.transmission = 1},
+      solid{.transmission = 1, .solid = true};
   BsdfParameters half{.metallic = 0.5f, .transmission = 0.5f, .solid = true};
   BsdfParameters bare{.specular = 0}, tinted_coat{.specular = 0.7f, .specular_color = {1, 0.5f, 0}};
   BsdfParameters coated_solid{.specular = 0.5f, .specular_color = {1, 0.5f, 0}, .transmission = 1, .solid = true};
-  BsdfParameters dense_solid{.ior = 2.4f, .transmission = 1, .solid = true}, airy_solid{.ior = 1.1f, .transmission = 1, .solid = true};
-  return {{"metal", metal}, {"plastic", plastic}, {"diamond plastic", diamond}, {"thin glass", thin}, {"solid glass", solid},
-          {"half metal half glass", half}, {"Lambert", bare}, {"tinted coat", tinted_coat}, {"coated glass", coated_solid},
-          {"dense glass", dense_solid}, {"airy glass", airy_solid}};
+  BsdfParameters dense_solid{.ior = 2.4f, .transmission = 1, .solid = true},
+      airy_solid{.ior = 1.1f, .transmission = 1, .solid = true};
+  return {{"metal", metal},
+          {"plastic", plastic},
+          {"diamond plastic", diamond},
+          {"thin glass", thin},
+          {"solid glass", solid},
+          {"half metal half glass", half},
+          {"Lambert", bare},
+          {"tinted coat", tinted_coat},
+          {"coated glass", coated_solid},
+          {"dense glass", dense_solid},
+          {"airy glass", airy_solid}};
 }
 
-const float kRoughness[] = {0, 1e-4f, 1e-3f, 0.01f, 0.0101f, 0.011f, 0.02f, 0.05f, 0.1f, 0.15f, 0.2f, 0.3f, 0.4f, 0.5f, 0.6f, 0.7f, 0.8f, 0.9f, 1};
+const float kRoughness[] = {0,    1e-4f, 1e-3f, 0.01f, 0.0101f, 0.011f, 0.02f, 0.05f, 0.1f, 0.15f,
+                            0.2f, 0.3f,  0.4f,  0.5f,  0.6f,    0.7f,   0.8f,  0.9f,  1};
 const float kAngles[] = {0, 15, 30, 41.8f, 45, 60, 70, 80, 85, 88, 89, 89.5f, 89.9f};
 
 /// Bounds on an albedo that is measured with an error: 4.5 standard errors are exceeded by chance once in 300,000 cases.
@@ -77,7 +88,8 @@ void furnace(std::uint32_t samples) {
         const Bsdf bsdf(m.parameters, outside, table.get());
         for (const float angle : kAngles) {
           const Albedo albedo = measure(bsdf, at_angle(angle), samples);
-          const std::string at = "roughness " + std::to_string(roughness) + " angle " + std::to_string(angle) + (outside ? "" : " inside");
+          const std::string at =
+              "roughness " + std::to_string(roughness) + " angle " + std::to_string(angle) + (outside ? "" : " inside");
           const float low = min_component(albedo.mean), high = max_component(albedo.mean);
           CHECK_MESSAGE(low + kSigmas * albedo.error >= 0.995f, m.name << " " << at);
           CHECK_MESSAGE(high - kSigmas * albedo.error <= 1.001f, m.name << " " << at);
@@ -170,7 +182,8 @@ TEST_CASE("special cases are exact") {
       const Bsdf bsdf({.base_color = red, .roughness = 0, .transmission = 1, .solid = true}, outside);
       CHECK(bsdf.events() == Events::S);
       const float sine_t = wo.x / eta, cosine_t = std::sqrt(1 - sine_t * sine_t);
-      const float rs = (wo.z - eta * cosine_t) / (wo.z + eta * cosine_t), rp = (eta * wo.z - cosine_t) / (eta * wo.z + cosine_t);
+      const float rs = (wo.z - eta * cosine_t) / (wo.z + eta * cosine_t),
+                  rp = (eta * wo.z - cosine_t) / (eta * wo.z + cosine_t);
       const float reflectance = (rs * rs + rp * rp) / 2;
       glm::dvec3 up{0}, down{0};
       constexpr int kSamples = 1 << 14;
@@ -221,7 +234,9 @@ TEST_CASE("special cases are exact") {
   }
   SUBCASE("bad numbers are clamped") {
     const float nan = std::nanf("");
-    const Bsdf bsdf({.base_color = Color(nan, 2, -1), .metallic = nan, .roughness = 7, .specular = nan, .ior = nan, .transmission = nan}, true);
+    const Bsdf bsdf(
+        {.base_color = Color(nan, 2, -1), .metallic = nan, .roughness = 7, .specular = nan, .ior = nan, .transmission = nan},
+        true);
     CHECK(bsdf.events() == Events::D);
     CHECK(bsdf.albedo(wo) == Color(0, 1, 0));
   }

@@ -68,19 +68,24 @@ std::vector<Case> cases() {
           {"glass 1", glass(1, true)},
           {"airy glass 0.5", {.roughness = 0.5f, .ior = 1.05f, .transmission = 1, .solid = true}},
           {"a third of all",
-           {.base_color = gold, .metallic = 0.3f, .roughness = 0.4f, .specular_color = {1, 0.5f, 0.2f}, .transmission = 0.5f, .solid = true}},
-          {"a third of all, thin", {.base_color = gold, .metallic = 0.3f, .roughness = 0.25f, .specular = 0.8f, .transmission = 0.5f}}};
+           {.base_color = gold,
+            .metallic = 0.3f,
+            .roughness = 0.4f,
+            .specular_color = {1, 0.5f, 0.2f},
+            .transmission = 0.5f,
+            .solid = true}},
+          {"a third of all, thin",
+           {.base_color = gold, .metallic = 0.3f, .roughness = 0.25f, .specular = 0.8f, .transmission = 0.5f}}};
 }
 
 /// The sphere of directions as two rectangles: radius in Lambert's equal-area projection of a hemisphere, and azimuth.
 /// Exact at the pole and at the horizon. d(omega) = 2 radius d(radius) d(azimuth).
 struct Chart {
-  static Vec2 from(const Vec3& w) {
-    return {std::sqrt((w.x * w.x + w.y * w.y) / (1 + std::abs(w.z))), std::atan2(w.y, w.x)};
-  }
+  static Vec2 from(const Vec3& w) { return {std::sqrt((w.x * w.x + w.y * w.y) / (1 + std::abs(w.z))), std::atan2(w.y, w.x)}; }
   static Vec3 to(double radius, double azimuth, bool up) {
     const double z = (1 - radius) * (1 + radius), s = radius * std::sqrt(1 + z);
-    return {static_cast<float>(s * std::cos(azimuth)), static_cast<float>(s * std::sin(azimuth)), static_cast<float>(up ? z : -z)};
+    return {static_cast<float>(s * std::cos(azimuth)), static_cast<float>(s * std::sin(azimuth)),
+            static_cast<float>(up ? z : -z)};
   }
 };
 
@@ -98,7 +103,8 @@ struct Peak {
     if (samples.size() < 50) return;
     const auto median = [&](auto&& value) {
       const auto middle = samples.begin() + static_cast<long>(samples.size() / 2);
-      std::nth_element(samples.begin(), middle, samples.end(), [&](const Vec2& a, const Vec2& b) { return value(a) < value(b); });
+      std::nth_element(samples.begin(), middle, samples.end(),
+                       [&](const Vec2& a, const Vec2& b) { return value(a) < value(b); });
       return static_cast<double>(value(*middle));
     };
     for (const std::size_t k : {0u, 1u}) {
@@ -124,20 +130,25 @@ double integrate(const Bsdf& bsdf, const Vec3& wo, Events mask, const Cell& cell
   };
   const auto refine = [&](auto&& self, double r0, double r1, double a0, double a1, double coarse, int depth) -> double {
     // Compare with four quarters, halve the longer side.
-    const double r = 0.5 * (r0 + r1), a = 0.5 * (a0 + a1), height = (r1 - r0) / peak.width[0], width = (a1 - a0) / peak.width[1];
+    const double r = 0.5 * (r0 + r1), a = 0.5 * (a0 + a1), height = (r1 - r0) / peak.width[0],
+                 width = (a1 - a0) / peak.width[1];
     const double fine = once(r0, r, a0, a) + once(r0, r, a, a1) + once(r, r1, a0, a) + once(r, r1, a, a1);
     // Refraction has ridges along the horizon.
     const bool tall = r1 - r0 > 0.001 + 0.15 * (1 - r1), wide = a1 - a0 > 0.3;
     const bool small = !tall && !wide && std::hypot(height, width) < std::max(0.3 * peak.distance(r, a), 0.3);
     if (depth == 0 || (small && std::abs(fine - coarse) < 1e-6 + accuracy * fine)) return fine;
-    if (tall || (!wide && height > width)) return self(self, r0, r, a0, a1, once(r0, r, a0, a1), depth - 1) + self(self, r, r1, a0, a1, once(r, r1, a0, a1), depth - 1);
-    return self(self, r0, r1, a0, a, once(r0, r1, a0, a), depth - 1) + self(self, r0, r1, a, a1, once(r0, r1, a, a1), depth - 1);
+    if (tall || (!wide && height > width))
+      return self(self, r0, r, a0, a1, once(r0, r, a0, a1), depth - 1) +
+             self(self, r, r1, a0, a1, once(r, r1, a0, a1), depth - 1);
+    return self(self, r0, r1, a0, a, once(r0, r1, a0, a), depth - 1) +
+           self(self, r0, r1, a, a1, once(r0, r1, a, a1), depth - 1);
   };
   return refine(refine, cell.low[0], cell.high[0], cell.low[1], cell.high[1], -1, 40);
 }
 
 /// Cells with about equally many of the pilot samples each.
-void split(std::vector<Vec2>& pilot, std::size_t first, std::size_t last, Cell cell, std::size_t per_cell, int axis, std::vector<Cell>& out) {
+void split(std::vector<Vec2>& pilot, std::size_t first, std::size_t last, Cell cell, std::size_t per_cell, int axis,
+           std::vector<Cell>& out) {
   if (last - first <= per_cell) {
     out.push_back(cell);
     out.back().first = first, out.back().last = last;
@@ -145,8 +156,9 @@ void split(std::vector<Vec2>& pilot, std::size_t first, std::size_t last, Cell c
   }
   const std::size_t middle = (first + last) / 2;
   const auto begin = pilot.begin();
-  std::nth_element(begin + static_cast<long>(first), begin + static_cast<long>(middle), begin + static_cast<long>(last),
-                   [&](const Vec2& a, const Vec2& b) { return a[static_cast<std::size_t>(axis)] < b[static_cast<std::size_t>(axis)]; });
+  std::nth_element(
+      begin + static_cast<long>(first), begin + static_cast<long>(middle), begin + static_cast<long>(last),
+      [&](const Vec2& a, const Vec2& b) { return a[static_cast<std::size_t>(axis)] < b[static_cast<std::size_t>(axis)]; });
   const double at = static_cast<double>(pilot[middle][static_cast<std::size_t>(axis)]);
   Cell below = cell, above = cell;
   below.high[static_cast<std::size_t>(axis)] = above.low[static_cast<std::size_t>(axis)] = at;
@@ -240,7 +252,8 @@ ChiSquare chi_square(const Bsdf& bsdf, const Vec3& wo, Events mask, int samples,
     std::vector<Cell> pieces;
     split(pilot[cells[c].up], cells[c].first, cells[c].last, cells[c], 8, 0, pieces);
     double probability = 0;
-    for (const Cell& piece : pieces) probability += integrate(bsdf, wo, mask, piece, peaks[cells[c].up], 2 / std::sqrt(samples));
+    for (const Cell& piece : pieces)
+      probability += integrate(bsdf, wo, mask, piece, peaks[cells[c].up], 2 / std::sqrt(samples));
     result.total += probability;
     add(counts[c], probability * samples);
   }
@@ -278,10 +291,14 @@ void chi_square_all(int samples, const std::vector<double>& angles) {
           if (mask != Events::all && (bsdf.events() & mask) != mask) continue;
           if (mask == Events::all && !any(bsdf.events() & Events::S)) continue;
           const ChiSquare test = chi_square(bsdf, wo, mask, samples, seed++);
-          results.push_back({material.name + (outside ? "" : " inside") + " at " + std::to_string(angle) + " mask " + std::to_string(int(mask)), test.p});
+          results.push_back({material.name + (outside ? "" : " inside") + " at " + std::to_string(angle) + " mask " +
+                                 std::to_string(int(mask)),
+                             test.p});
           // Nothing is counted twice or forgotten, but what sampling itself gives up.
-          const double error = std::abs(test.total + test.specular + test.lost - 1) - 5 * std::sqrt((test.lost + test.specular) / samples);
-          CHECK_MESSAGE(error < 1e-3, results.back().name << ": " << test.total << " + " << test.specular << " + " << test.lost);
+          const double error =
+              std::abs(test.total + test.specular + test.lost - 1) - 5 * std::sqrt((test.lost + test.specular) / samples);
+          CHECK_MESSAGE(error < 1e-3,
+                        results.back().name << ": " << test.total << " + " << test.specular << " + " << test.lost);
           worst_total = std::max(worst_total, error);
         }
       }
@@ -294,7 +311,8 @@ void chi_square_all(int samples, const std::vector<double>& angles) {
     CHECK_MESSAGE(r.p > least, r.name);
     smallest = std::min(smallest, r.p);
   }
-  MESSAGE(results.size() << " tests, smallest p " << smallest << " (limit " << least << "), worst integral off by " << worst_total);
+  MESSAGE(results.size() << " tests, smallest p " << smallest << " (limit " << least << "), worst integral off by "
+                         << worst_total);
 }
 
 }  // namespace
@@ -323,7 +341,8 @@ TEST_CASE("weight = f cos / pdf, and one call agrees with two") {
         const Color f = bsdf->f_cos(wo, s.wi, mask, carried);
         const float pdf_w = bsdf->pdf_w(wo, s.wi, mask);
         CHECK(pdf_w == doctest::Approx(s.pdf_w).epsilon(1e-5));
-        for (int c = 0; c < 3; c++) worst = std::max(worst, static_cast<double>(std::abs(s.weight[c] * pdf_w - f[c]) / (f[c] + 1e-6f)));
+        for (int c = 0; c < 3; c++)
+          worst = std::max(worst, static_cast<double>(std::abs(s.weight[c] * pdf_w - f[c]) / (f[c] + 1e-6f)));
         const BsdfValue both = bsdf->evaluate(wo, s.wi, mask, carried);
         CHECK(both.pdf_w == doctest::Approx(pdf_w).epsilon(1e-5));
         CHECK(both.f_cos.x == doctest::Approx(f.x).epsilon(1e-5));

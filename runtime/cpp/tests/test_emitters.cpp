@@ -370,14 +370,12 @@ TEST_CASE("surfaces emit on the front, on both sides where they are double-sided
   CHECK(emitters.environment_pdf_w(receiver({}), up, up) == 0);
 
   // A selection knows only its own.
-  const Emitters second(
-      scene.data, nullptr, [](std::size_t part) { return part == 1; }, [](std::size_t) { return false; });
+  const Emitters second(scene.data, nullptr, [](std::size_t part) { return part == 1; }, [](std::size_t) { return false; });
   CHECK(second.size() == 1);
   CHECK(second.radiance(hit_of(0), up) == Color(0));
   CHECK(second.radiance(hit_of(1), up) == Color(4));
   CHECK(second.pdf_w(receiver({0.1f, 0.1f, 0.1f}), Vec3(0), hit_of(0), up) == 0);
-  const Emitters none(
-      scene.data, nullptr, [](std::size_t) { return false; }, [](std::size_t) { return false; });
+  const Emitters none(scene.data, nullptr, [](std::size_t) { return false; }, [](std::size_t) { return false; });
   CHECK(none.empty());
   CHECK(!none.has_area());
   CHECK(none.sample(receiver({}), up, 0.5f, {0.5f, 0.5f}).pdf_w == 0);

@@ -28,7 +28,8 @@ std::uint32_t hash(std::uint32_t x) {
 
 /// In [0, 1).
 float noise(int x, int y, std::uint32_t sample) {
-  return static_cast<float>(hash(hash(hash(static_cast<std::uint32_t>(x)) + static_cast<std::uint32_t>(y)) + sample) >> 8) * 0x1p-24f;
+  return static_cast<float>(hash(hash(hash(static_cast<std::uint32_t>(x)) + static_cast<std::uint32_t>(y)) + sample) >> 8) *
+         0x1p-24f;
 }
 
 /// Mean 1, variance of a sample 1/3 in each channel.
@@ -38,7 +39,8 @@ void render_noise(const Tile& tile, Film& film) {
       if (tile.stopped()) return;
       for (std::uint32_t i = 0; i < tile.sample_count; ++i) {
         const std::uint32_t sample = tile.first_sample + i;
-        film.add(x, y, sample, Color(2 * noise(x, y, 3 * sample), 2 * noise(x, y, 3 * sample + 1), 2 * noise(x, y, 3 * sample + 2)));
+        film.add(x, y, sample,
+                 Color(2 * noise(x, y, 3 * sample), 2 * noise(x, y, 3 * sample + 1), 2 * noise(x, y, 3 * sample + 2)));
         if (film.layer_count() > 0) film.add_layer(0, x, y, Color(noise(x, y, sample)));
       }
     }

@@ -38,7 +38,8 @@ DVec3 world(const SceneData& scene, std::uint32_t vertex) { return scene.origin 
 
 double volume(const SceneData& scene) {
   double sum = 0;
-  for (const UVec3& t : scene.triangles) sum += glm::dot(world(scene, t.x), glm::cross(world(scene, t.y), world(scene, t.z))) / 6;
+  for (const UVec3& t : scene.triangles)
+    sum += glm::dot(world(scene, t.x), glm::cross(world(scene, t.y), world(scene, t.z))) / 6;
   return sum;
 }
 
@@ -225,7 +226,8 @@ TEST_CASE("the default scene, else the first, else all roots") {
   CHECK(file.load(R"("scenes":[{}],)" + nodes).triangles.empty());
   CHECK(load_error(file.text(R"("scenes":[{"nodes":[0,0]}],)" + nodes)) ==
         "scene.gltf: scenes[0].nodes[1]: nodes[0] is listed twice");
-  CHECK(load_error(file.text(R"("scenes":[{"nodes":[1]}],)" + nodes)).find("is the child of another node") != std::string::npos);
+  CHECK(load_error(file.text(R"("scenes":[{"nodes":[1]}],)" + nodes)).find("is the child of another node") !=
+        std::string::npos);
 }
 
 // ---------------------------------------------------------------- primitives and formats
@@ -240,8 +242,8 @@ TEST_CASE("lists, strips and fans, with and without indices, give the same trian
     if (!bytes.empty()) file.accessor(5121, "SCALAR", bytes.size(), bytes);
     if (!words.empty()) file.accessor(5125, "SCALAR", words.size(), words);
     if (!bytes.empty() || !words.empty()) indices = ",\"indices\":1";
-    return triangles(file.load("\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"mode\":" + std::to_string(mode) +
-                               indices + "}]}],\"nodes\":[{\"mesh\":0}]"));
+    return triangles(file.load("\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"mode\":" +
+                               std::to_string(mode) + indices + "}]}],\"nodes\":[{\"mesh\":0}]"));
   };
   const auto list = load(fan, {0, 1, 2, 0, 2, 3, 0, 3, 4}, {}, 4);
   CHECK(list.size() == 3);
@@ -313,9 +315,9 @@ TEST_CASE("sparse accessors replace elements, with and without a base") {
                                       "}}]}],\"nodes\":[{\"mesh\":0}]");
     CHECK(area(scene) == doctest::Approx(17.5));
   }
-  const std::string unordered =
-      "\"sparse\":{\"count\":2,\"indices\":{\"bufferView\":" + std::to_string(file.buffer_view(std::vector<std::uint8_t>{2, 2})) +
-      ",\"componentType\":5121},\"values\":{\"bufferView\":" + std::to_string(values) + "}}";
+  const std::string unordered = "\"sparse\":{\"count\":2,\"indices\":{\"bufferView\":" +
+                                std::to_string(file.buffer_view(std::vector<std::uint8_t>{2, 2})) +
+                                ",\"componentType\":5121},\"values\":{\"bufferView\":" + std::to_string(values) + "}}";
   file.accessor_text("{\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"," + unordered + "}");
   CHECK(load_error(file.text("\"nodes\":[]")) ==
         "scene.gltf: accessors[3].sparse.indices: element 1 is not above the one before it");
@@ -330,12 +332,14 @@ TEST_CASE("vertex colours and texture coordinates in all their formats") {
       5123, "VEC4", 3, std::vector<std::uint16_t>{65535, 0, 13107, 32768, 65535, 0, 13107, 32768, 65535, 0, 13107, 32768},
       "\"normalized\":true");
   const int floats = file.floats("VEC4", {2, -1, 0.2f, 0.5f, 2, -1, 0.2f, 0.5f, 2, -1, 0.2f, 0.5f});
-  const int uv = file.accessor(5121, "VEC2", 3, std::vector<std::uint8_t>{0, 255, 51, 102, 255, 0, 0, 0}, "\"normalized\":true");
+  const int uv =
+      file.accessor(5121, "VEC2", 3, std::vector<std::uint8_t>{0, 255, 51, 102, 255, 0, 0, 0}, "\"normalized\":true");
   const auto load = [&](int color) {
-    return file.load("\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"COLOR_0\":" + std::to_string(color) +
-                     ",\"TEXCOORD_0\":" + std::to_string(uv) +
-                     "}},{\"attributes\":{\"POSITION\":0},\"material\":0}]}],\"materials\":[{\"alphaMode\":\"MASK\"}],\"nodes\":["
-                     "{\"mesh\":0}]");
+    return file.load(
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"COLOR_0\":" + std::to_string(color) +
+        ",\"TEXCOORD_0\":" + std::to_string(uv) +
+        "}},{\"attributes\":{\"POSITION\":0},\"material\":0}]}],\"materials\":[{\"alphaMode\":\"MASK\"}],\"nodes\":["
+        "{\"mesh\":0}]");
   };
   for (const int color : {rgb, rgba, floats}) {
     const SceneData scene = load(color);
@@ -535,8 +539,8 @@ Material load_material(const std::string& material, const std::string& rest = {}
 TEST_CASE("materials: defaults and factors") {
   const Material m = load_material("");
   CHECK(m.base_color == Color(1));
-  CHECK((m.metallic == 1 && m.roughness == 1 && m.ior == 1.5f && m.specular == 1 && m.transmission == 0 && !m.solid && !m.unlit &&
-         !m.double_sided));
+  CHECK((m.metallic == 1 && m.roughness == 1 && m.ior == 1.5f && m.specular == 1 && m.transmission == 0 && !m.solid &&
+         !m.unlit && !m.double_sided));
   CHECK(!m.emits());
   CHECK(m.attenuation_distance == kInfinity);
 
@@ -548,7 +552,8 @@ TEST_CASE("materials: defaults and factors") {
   check_near(f.base_color, Color(0.1f, 0.2f, 0.3f));
   CHECK(f.alpha == doctest::Approx(0.4));
   CHECK((f.alpha_mode == AlphaMode::mask && f.alpha_cutoff == 0.25f && f.double_sided));
-  CHECK((f.metallic == 0.5f && f.roughness == 0.6f && f.ior == 1.33f && f.transmission == 0.7f && f.solid && f.specular == 0.8f));
+  CHECK(
+      (f.metallic == 0.5f && f.roughness == 0.6f && f.ior == 1.33f && f.transmission == 0.7f && f.solid && f.specular == 0.8f));
   check_near(f.emission, Color(10, 5, 0));
   CHECK(f.attenuation_distance == 2);  // the unit is 2
   check_near(f.attenuation_color, Color(0.9f, 0.8f, 0.7f));

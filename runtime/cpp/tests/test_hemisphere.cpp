@@ -68,11 +68,15 @@ void check_gradients(const Room& room, const Vec3& p, const Vec3& n, double tole
 
   constexpr float kStep = 0.03f;
   for (const Vec3& axis : {frame.s, frame.t}) {
-    const double moved = (irradiance(room, p + kStep * axis, n) - irradiance(room, p - kStep * axis, n)) / (2 * static_cast<double>(kStep));
+    const double moved =
+        (irradiance(room, p + kStep * axis, n) - irradiance(room, p - kStep * axis, n)) / (2 * static_cast<double>(kStep));
     CHECK(static_cast<double>((axis * sample.translation).x) == doctest::Approx(moved).epsilon(tolerance).scale(E));
-    const auto tilted = [&](float angle) { return irradiance(room, p, glm::normalize(n * std::cos(angle) + axis * std::sin(angle))); };
+    const auto tilted = [&](float angle) {
+      return irradiance(room, p, glm::normalize(n * std::cos(angle) + axis * std::sin(angle)));
+    };
     const double turned = (tilted(kStep) - tilted(-kStep)) / (2 * static_cast<double>(kStep));
-    CHECK(static_cast<double>((glm::cross(n, axis) * sample.rotation).x) == doctest::Approx(turned).epsilon(tolerance).scale(E));
+    CHECK(static_cast<double>((glm::cross(n, axis) * sample.rotation).x) ==
+          doctest::Approx(turned).epsilon(tolerance).scale(E));
   }
 }
 

@@ -51,10 +51,11 @@ std::string png(std::uint32_t width, std::uint32_t height, char depth, char colo
     b = (b + a) % 65521;
   }
   const auto low = static_cast<char>(raw.size()), high = static_cast<char>(raw.size() >> 8);
-  const std::string stored = std::string("\x78\x01\x01") + low + high + static_cast<char>(~low) + static_cast<char>(~high) + raw +
-                             big_endian(b << 16 | a);
-  return "\x89PNG\r\n\x1a\n" + chunk("IHDR", big_endian(width) + big_endian(height) + depth + color_type + std::string(3, '\0')) +
-         more_chunks + chunk("IDAT", stored) + chunk("IEND", "");
+  const std::string stored = std::string("\x78\x01\x01") + low + high + static_cast<char>(~low) + static_cast<char>(~high) +
+                             raw + big_endian(b << 16 | a);
+  return "\x89PNG\r\n\x1a\n" +
+         chunk("IHDR", big_endian(width) + big_endian(height) + depth + color_type + std::string(3, '\0')) + more_chunks +
+         chunk("IDAT", stored) + chunk("IEND", "");
 }
 
 std::span<const std::uint8_t> bytes_of(const std::string& text) {

@@ -68,7 +68,9 @@ TEST_CASE("the octree finds the records that a search of all finds") {
   CHECK(found_some > 100);
 }
 
-TEST_CASE("reach: the allowed error times the distance, within bounds; less where irradiance changes fast or a neighbour is near a wall") {
+TEST_CASE(
+    "reach: the allowed error times the distance, within bounds; less where irradiance changes fast or a neighbour is near a "
+    "wall") {
   const RecordSpacing spacing{0.2f, 0.02f, 0.3f};
   const auto reach = [&](const IrradianceSample& sample) {
     IrradianceRecords records(spacing);
@@ -117,7 +119,9 @@ TEST_CASE("a dark record in a gap, used farther away than it should be, gives wa
 TEST_CASE("a dark record in a gap, alone and far out of its depth, is no cover") {
   IrradianceRecords records(RecordSpacing{0.2f, 0.02f, 0.3f});
   records.add(receiver(Vec3(0)), seen(1e-3f, 0));
-  const auto cover = [&](const Vec3& p) { return records.visit(p, Vec3(0, 1, 0), IrradianceRecords::kOverlap, [](const IrradianceRecord&, float) {}); };
+  const auto cover = [&](const Vec3& p) {
+    return records.visit(p, Vec3(0, 1, 0), IrradianceRecords::kOverlap, [](const IrradianceRecord&, float) {});
+  };
   CHECK(cover(Vec3(0)) > IrradianceRecords::kEnough);
   CHECK(cover(Vec3(0.015f, 0, 0)) > 0);
   CHECK(cover(Vec3(0.015f, 0, 0)) < IrradianceRecords::kEnough);
@@ -154,9 +158,10 @@ TEST_CASE("covering: all places are covered, sparsely, the same for any number o
   for (const int threads : {1, 2, 5}) {
     Stage stage(any_scene(), threads);
     IrradianceRecords records(RecordSpacing{});
-    const std::vector<Receiver> places = cover(stage.context, records, wanted, 7, [&](Tracer&, const Receiver& where, std::uint32_t key) {
-      return seen(0.3f + 0.2f * where.p.x, 1 + 0.1f * to_unit_float(key));
-    });
+    const std::vector<Receiver> places =
+        cover(stage.context, records, wanted, 7, [&](Tracer&, const Receiver& where, std::uint32_t key) {
+          return seen(0.3f + 0.2f * where.p.x, 1 + 0.1f * to_unit_float(key));
+        });
     REQUIRE(places.size() == records.size());
     CHECK(records.size() < wanted.size() / 2);
     for (const Receiver& where : wanted) CHECK(records.covers(where.p, where.n));

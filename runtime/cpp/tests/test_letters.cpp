@@ -61,7 +61,8 @@ TEST_CASE("letters by kind and tag") {
   data.lights.emplace_back().node = "b";
   data.lights.back().intensity = Color(1);
   data.lights.emplace_back().node = "a";  // dark
-  const TagRule rules[] = {{0, "unused", TagRule::Kind::node, "x"}, {1, "b", TagRule::Kind::node, "b"}, {2, "c", TagRule::Kind::node, "[bc]"}};
+  const TagRule rules[] = {
+      {0, "unused", TagRule::Kind::node, "x"}, {1, "b", TagRule::Kind::node, "b"}, {2, "c", TagRule::Kind::node, "[bc]"}};
   const Scene scene(std::move(data), rules, 1, nullptr);
 
   const int tags[] = {2, 1};  // combinations: bit 0 is tag 2, bit 1 is tag 1
@@ -70,7 +71,7 @@ TEST_CASE("letters by kind and tag") {
   CHECK(letters.kinds[LetterSet::delta_emitter] == 0b1000);  // b
   CHECK(letters.kinds[LetterSet::diffuse] == 0b0011);        // a, c
   CHECK(letters.kinds[LetterSet::glossy] == 0);
-  CHECK(letters.kinds[LetterSet::specular] == 0b1000);       // b
+  CHECK(letters.kinds[LetterSet::specular] == 0b1000);  // b
   CHECK(letters_of(scene, {}).kinds == std::array<std::uint64_t, 5>{1, 1, 1, 0, 1});
 }
 
@@ -117,7 +118,10 @@ TEST_CASE("a textured surface scatters by no event but those that were found") {
 TEST_CASE("the reason names what the nearest alternative lacks") {
   LetterSet scene;
   scene.kinds[LetterSet::area_emitter] = scene.kinds[LetterSet::diffuse] = 1;
-  const LetterNeed needs[] = {{{{1, 1, 0, 0, 0}}, "emitter"}, {{{0, 0, 0, 0, 1}}, "specular surface"}, {{{0, 0, 0, 1, 0}}, "glossy surface"}, {{{0, 1, 0, 0, 0}}, "point light"}};
+  const LetterNeed needs[] = {{{{1, 1, 0, 0, 0}}, "emitter"},
+                              {{{0, 0, 0, 0, 1}}, "specular surface"},
+                              {{{0, 0, 0, 1, 0}}, "glossy surface"},
+                              {{{0, 1, 0, 0, 0}}, "point light"}};
   const std::uint64_t far[] = {0b1111, 0b0101, 0b1100};
   CHECK(skip_reason({0, nullptr, needs, far}, scene) == "the scene has no glossy surface");
   const std::uint64_t two[] = {0b0110};

@@ -65,10 +65,35 @@ TEST_CASE("defaults") {
 }
 
 TEST_CASE("all options") {
-  const Options options = Parameters().parse({"-o", "a.exr", "--size", "30x20", "--camera", "Cam 1", "--samples", "2k", "--time", "1.5",
-                                            "--error=1%", "--seed", "18446744073709551615", "--threads", "5", "--stats", "s.json",
-                                            "--progress", "json", "--preview", "p.png", "--env", "e.hdr", "--units", "photometric",
-                                            "--set", "photons.count=7", "s.gltf", "--set=photons.aim=off"});
+  const Options options = Parameters().parse({"-o",
+                                              "a.exr",
+                                              "--size",
+                                              "30x20",
+                                              "--camera",
+                                              "Cam 1",
+                                              "--samples",
+                                              "2k",
+                                              "--time",
+                                              "1.5",
+                                              "--error=1%",
+                                              "--seed",
+                                              "18446744073709551615",
+                                              "--threads",
+                                              "5",
+                                              "--stats",
+                                              "s.json",
+                                              "--progress",
+                                              "json",
+                                              "--preview",
+                                              "p.png",
+                                              "--env",
+                                              "e.hdr",
+                                              "--units",
+                                              "photometric",
+                                              "--set",
+                                              "photons.count=7",
+                                              "s.gltf",
+                                              "--set=photons.aim=off"});
   CHECK(options.scene == "s.gltf");
   CHECK(options.output == "a.exr");
   CHECK(options.width == 30);
@@ -108,12 +133,16 @@ TEST_CASE("wrong use is refused with what was found and what was wanted") {
   for (const char* value : {"-1", "0", "1.5", "abc", "", "1e99", "nan", "inf", "0x10", "5%", "1 "}) {
     CHECK_MESSAGE(contains(usage_error({"s.gltf", "--samples", value}), "--samples"), value);
   }
-  for (const char* value : {"0x5", "5x0", "5", "x", "5x", "x5", "-3x5", "5x5x5", "5.5x4", "65537x1", "99999999999999x5", "65536x65536"}) {
+  for (const char* value :
+       {"0x5", "5x0", "5", "x", "5x", "x5", "-3x5", "5x5x5", "5.5x4", "65537x1", "99999999999999x5", "65536x65536"}) {
     CHECK_MESSAGE(contains(usage_error({"s.gltf", "--size", value}), "--size"), value);
   }
-  for (const char* value : {"0", "-2", "9999", "two"}) CHECK(contains(usage_error({"s.gltf", "--threads", value}), "--threads"));
-  for (const char* value : {"-1", "18446744073709551616", "1.5", "x"}) CHECK(contains(usage_error({"s.gltf", "--seed", value}), "--seed"));
-  for (const char* value : {"0", "-3", "soon", "nan", "5deg"}) CHECK(contains(usage_error({"s.gltf", "--time", value}), "--time"));
+  for (const char* value : {"0", "-2", "9999", "two"})
+    CHECK(contains(usage_error({"s.gltf", "--threads", value}), "--threads"));
+  for (const char* value : {"-1", "18446744073709551616", "1.5", "x"})
+    CHECK(contains(usage_error({"s.gltf", "--seed", value}), "--seed"));
+  for (const char* value : {"0", "-3", "soon", "nan", "5deg"})
+    CHECK(contains(usage_error({"s.gltf", "--time", value}), "--time"));
   for (const char* value : {"0", "-1%", "x", "inf"}) CHECK(contains(usage_error({"s.gltf", "--error", value}), "--error"));
 }
 
@@ -154,7 +183,8 @@ TEST_CASE("--set refuses what no slot takes") {
   CHECK(contains(error("caustic.radius=1e39km"), "caustic.radius"));
   CHECK(contains(error("caustic.kernel=bix"), "one of cone, box"));
   CHECK(contains(error("photons.aim=maybe"), "true or false"));
-  for (const char* text : {"", "x", "photons.count", "=3", ".=3", "photons.=3", ".count=3", "photons=3"}) CHECK_MESSAGE(!error(text).empty(), text);
+  for (const char* text : {"", "x", "photons.count", "=3", ".=3", "photons.=3", ".count=3", "photons=3"})
+    CHECK_MESSAGE(!error(text).empty(), text);
 }
 
 TEST_CASE("parameter_text writes what set_parameter reads") {
@@ -175,7 +205,8 @@ TEST_CASE("--help names the network's parameters with defaults and ranges") {
   } catch (const HelpRequest& request) {
     text = request.text;
   }
-  for (const char* part : {"network SCENE [OPTIONS]", "composite.ln:4", "photons.count=200k", "between 1 and 1G", "one of cone, box", "L(D|G|S)*E", "130"})
+  for (const char* part : {"network SCENE [OPTIONS]", "composite.ln:4", "photons.count=200k", "between 1 and 1G",
+                           "one of cone, box", "L(D|G|S)*E", "130"})
     CHECK_MESSAGE(contains(text, part), part);
 }
 

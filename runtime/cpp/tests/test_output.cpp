@@ -48,7 +48,9 @@ ssize_t pwrite(int file, const void* data, size_t size, off_t offset) {
   return syscall(SYS_pwrite64, file, data, size, offset);
 }
 int fsync(int file) { return faults::hit() ? -1 : static_cast<int>(syscall(SYS_fsync, file)); }
-int rename(const char* from, const char* to) noexcept { return faults::hit() ? -1 : static_cast<int>(syscall(SYS_rename, from, to)); }
+int rename(const char* from, const char* to) noexcept {
+  return faults::hit() ? -1 : static_cast<int>(syscall(SYS_rename, from, to));
+}
 int close(int file) {
   const bool fail = faults::hit();  // the descriptor is gone even if close fails
   const int error_number = errno;
@@ -71,7 +73,9 @@ struct Folder {
     fs::remove_all(path);
   }
   std::string file(const char* name) const { return (path / name).string(); }
-  std::size_t entries() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), fs::directory_iterator())); }
+  std::size_t entries() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(path), fs::directory_iterator()));
+  }
 
   static fs::path make() {
     std::string name = (fs::temp_directory_path() / "ln_output_XXXXXX").string();

@@ -43,8 +43,10 @@ TEST_CASE("in a closed box whose walls all shine, the irradiance is the same eve
       b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), b.material(Color(0.5f), Color(1)), true, pieces);
       const Estimate e(b.data, 300'000, 60, kernel);
       // About 160,000 photons on the floor: a standard error of 0.3 %, in the strips of 1 %.
-      CHECK(e.mean([](Vec2 u) { return Vec3(u.x - 0.5f, -0.4f, 0.6f * u.y - 0.3f); }, kUp) == doctest::Approx(truth).epsilon(0.012));
-      CHECK(e.mean([](Vec2 u) { return Vec3(u.x - 0.5f, -0.4f, 0.3f - 0.02f * u.y); }, kUp) == doctest::Approx(truth).epsilon(0.035));
+      CHECK(e.mean([](Vec2 u) { return Vec3(u.x - 0.5f, -0.4f, 0.6f * u.y - 0.3f); }, kUp) ==
+            doctest::Approx(truth).epsilon(0.012));
+      CHECK(e.mean([](Vec2 u) { return Vec3(u.x - 0.5f, -0.4f, 0.3f - 0.02f * u.y); }, kUp) ==
+            doctest::Approx(truth).epsilon(0.035));
       // All corners, each seen from its three faces.
       double corners = 0;
       for (int i = 0; i < 8; ++i) {
@@ -73,9 +75,12 @@ TEST_CASE("a plane under a directional light is evenly lit up to its border") {
   b.directional({0.3f, -1, 0.2f}, Color(3));
   const Estimate e(b.data, 400'000);
   const double truth = 3 / std::sqrt(1 + 0.09 + 0.04);
-  CHECK(e.mean([](Vec2 u) { return Vec3(1.4f * u.x - 0.7f, 0.01f, 1.4f * u.y - 0.7f); }, kUp) == doctest::Approx(truth).epsilon(0.015));
-  CHECK(e.mean([](Vec2 u) { return Vec3(0.7f - 0.01f * u.x, 0.01f, 1.4f * u.y - 0.7f); }, kUp) == doctest::Approx(truth).epsilon(0.015));
-  CHECK(e.mean([](Vec2 u) { return Vec3(0.7f - 0.01f * u.x, 0.01f, 0.01f * u.y - 0.7f); }, kUp) == doctest::Approx(truth).epsilon(0.05));
+  CHECK(e.mean([](Vec2 u) { return Vec3(1.4f * u.x - 0.7f, 0.01f, 1.4f * u.y - 0.7f); }, kUp) ==
+        doctest::Approx(truth).epsilon(0.015));
+  CHECK(e.mean([](Vec2 u) { return Vec3(0.7f - 0.01f * u.x, 0.01f, 1.4f * u.y - 0.7f); }, kUp) ==
+        doctest::Approx(truth).epsilon(0.015));
+  CHECK(e.mean([](Vec2 u) { return Vec3(0.7f - 0.01f * u.x, 0.01f, 0.01f * u.y - 0.7f); }, kUp) ==
+        doctest::Approx(truth).epsilon(0.05));
 }
 
 TEST_CASE("half of a surface sees the same light as all of it") {
@@ -85,14 +90,16 @@ TEST_CASE("half of a surface sees the same light as all of it") {
   b.data.materials.back().alpha = 0.5f;
   b.directional({0, -1, 0}, Color(1));
   const Estimate e(b.data, 200'000);
-  CHECK(e.mean([](Vec2 u) { return Vec3(1.4f * u.x - 0.7f, 0.01f, 1.4f * u.y - 0.7f); }, kUp) == doctest::Approx(1).epsilon(0.02));
+  CHECK(e.mean([](Vec2 u) { return Vec3(1.4f * u.x - 0.7f, 0.01f, 1.4f * u.y - 0.7f); }, kUp) ==
+        doctest::Approx(1).epsilon(0.02));
 }
 
 TEST_CASE("inside a finely divided sphere: Phi / (A (1 - rho))") {
   SceneBuilder b;
   b.sphere(Vec3(0), 0.8f, b.material(Color(0.5f), Color(1)), true, 60);
   const Estimate e(b.data, 300'000);
-  CHECK(mean_over_square([&](Vec2 u) { return e.at({Vec3(0), direction_at(u)}); }) == doctest::Approx(2 * static_cast<double>(kPi)).epsilon(0.01));
+  CHECK(mean_over_square([&](Vec2 u) { return e.at({Vec3(0), direction_at(u)}); }) ==
+        doctest::Approx(2 * static_cast<double>(kPi)).epsilon(0.01));
 }
 
 TEST_CASE("a small ball of many triangles gets its light, also with few photons") {
@@ -122,7 +129,8 @@ TEST_CASE("things that stand on a floor leave no dark rim, and twice the same fl
     b.box({-0.2f, 0.01f, -0.2f}, {0.2f, 0.3f, 0.2f}, b.material(Color(0.5f)), false);
     b.directional({0, -1, 0}, Color(1));
     const Estimate e(b.data, 300'000, 60, PhotonKernel::cone, path_automaton<EmptyPath>());
-    CHECK(e.mean([](Vec2 u) { return Vec3(0.205f + 0.01f * u.x, 0.01f, 0.3f * u.y - 0.15f); }, kUp) == doctest::Approx(1).epsilon(0.03));
+    CHECK(e.mean([](Vec2 u) { return Vec3(0.205f + 0.01f * u.x, 0.01f, 0.3f * u.y - 0.15f); }, kUp) ==
+          doctest::Approx(1).epsilon(0.03));
     CHECK(e.mean([](Vec2 u) { return Vec3(0.4f + 0.2f * u.x, 0.01f, u.y - 0.5f); }, kUp) == doctest::Approx(1).epsilon(0.03));
   }
 }
@@ -134,7 +142,8 @@ TEST_CASE("light does not leak below a thin wall") {
   b.directional({0, -1, 0}, Color(1));
   const Estimate e(b.data, 200'000, 60, PhotonKernel::cone, path_automaton<EmptyPath>());
   CHECK(e.mean([](Vec2 u) { return Vec3(-0.001f - 0.02f * u.x, 0.01f, 0.6f * u.y - 0.3f); }, kUp) < 1e-3);
-  CHECK(e.mean([](Vec2 u) { return Vec3(0.001f + 0.02f * u.x, 0.01f, 0.6f * u.y - 0.3f); }, kUp) == doctest::Approx(1).epsilon(0.03));
+  CHECK(e.mean([](Vec2 u) { return Vec3(0.001f + 0.02f * u.x, 0.01f, 0.6f * u.y - 0.3f); }, kUp) ==
+        doctest::Approx(1).epsilon(0.03));
 }
 
 TEST_CASE("no light is gathered from far away") {

@@ -42,8 +42,7 @@ struct Meshed : Traced {
 };
 
 /// The integral of a mesh over all surfaces, or some of its faces: its flux.
-double flux(
-    const TriMesh& mesh, const std::function<bool(std::uint32_t)>& counts = [](std::uint32_t) { return true; }) {
+double flux(const TriMesh& mesh, const std::function<bool(std::uint32_t)>& counts = [](std::uint32_t) { return true; }) {
   double sum = 0;
   for (std::uint32_t face = 0; face < mesh.patches().face_count(); ++face) {
     if (!counts(face)) continue;

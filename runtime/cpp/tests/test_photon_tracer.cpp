@@ -15,10 +15,13 @@ SceneData room(bool closed = true) {
   b.quad({-0.5f, -0.5f, 0.5f}, {0.5f, -0.5f, 0.5f}, {0.5f, -0.5f, -0.5f}, {-0.5f, -0.5f, -0.5f}, b.glossy({0.6f, 0.5f, 0.4f}));
   b.quad({-0.5f, 0.5f, -0.5f}, {0.5f, 0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}, {-0.5f, 0.5f, 0.5f}, b.material({0.7f, 0.7f, 0.7f}));
   b.quad({-0.5f, -0.5f, -0.5f}, {0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, -0.5f}, {-0.5f, 0.5f, -0.5f}, b.mirror({0.9f, 0.9f, 0.9f}));
-  b.quad({-0.5f, -0.5f, 0.5f}, {-0.5f, -0.5f, -0.5f}, {-0.5f, 0.5f, -0.5f}, {-0.5f, 0.5f, 0.5f}, b.material({0.8f, 0.1f, 0.1f}));
+  b.quad({-0.5f, -0.5f, 0.5f}, {-0.5f, -0.5f, -0.5f}, {-0.5f, 0.5f, -0.5f}, {-0.5f, 0.5f, 0.5f},
+         b.material({0.8f, 0.1f, 0.1f}));
   b.quad({0.5f, -0.5f, -0.5f}, {0.5f, -0.5f, 0.5f}, {0.5f, 0.5f, 0.5f}, {0.5f, 0.5f, -0.5f}, b.material({0.1f, 0.8f, 0.1f}));
-  if (closed) b.quad({0.5f, -0.5f, 0.5f}, {-0.5f, -0.5f, 0.5f}, {-0.5f, 0.5f, 0.5f}, {0.5f, 0.5f, 0.5f}, b.material({0.5f, 0.5f, 0.5f}));
-  b.quad({-0.1f, 0.45f, -0.1f}, {0.1f, 0.45f, -0.1f}, {0.1f, 0.45f, 0.1f}, {-0.1f, 0.45f, 0.1f}, b.material({0, 0, 0}, {5, 4, 3}));
+  if (closed)
+    b.quad({0.5f, -0.5f, 0.5f}, {-0.5f, -0.5f, 0.5f}, {-0.5f, 0.5f, 0.5f}, {0.5f, 0.5f, 0.5f}, b.material({0.5f, 0.5f, 0.5f}));
+  b.quad({-0.1f, 0.45f, -0.1f}, {0.1f, 0.45f, -0.1f}, {0.1f, 0.45f, 0.1f}, {-0.1f, 0.45f, 0.1f},
+         b.material({0, 0, 0}, {5, 4, 3}));
   return b.data;
 }
 
@@ -62,8 +65,10 @@ TEST_CASE("the ledger closes, and roulette is fair") {
       CHECK(relative(l.emitted[c], stage.scene.emitters().total_power()[c]) < 1e-3);
       CHECK(std::abs(l.roulette_gain[c] - l.roulette_loss[c]) < 4 * std::sqrt(l.roulette_squares[c]));
       CHECK(l.roulette_gain[c] > 0);
-      if (closed) CHECK(l.escaped[c] == 0);
-      else CHECK(l.escaped[c] > 0.05 * l.emitted[c]);
+      if (closed)
+        CHECK(l.escaped[c] == 0);
+      else
+        CHECK(l.escaped[c] > 0.05 * l.emitted[c]);
     }
   }
 }
@@ -85,7 +90,7 @@ TEST_CASE("in a closed diffuse box, the first hits carry all the light, and all 
 
 TEST_CASE("via = S+ keeps only what came by mirrors") {
   SceneBuilder b;
-  b.quad({-1, -0.1f, 1}, {0, -0.1f, 1}, {0, -0.1f, -1}, {-1, -0.1f, -1}, b.mirror());           // left half of the floor: a mirror
+  b.quad({-1, -0.1f, 1}, {0, -0.1f, 1}, {0, -0.1f, -1}, {-1, -0.1f, -1}, b.mirror());  // left half of the floor: a mirror
   b.quad({0, -0.1f, 1}, {1, -0.1f, 1}, {1, -0.1f, -1}, {0, -0.1f, -1}, b.material(Color(0.5f)));  // right half: diffuse
   b.quad({-1, 0.5f, -1}, {1, 0.5f, -1}, {1, 0.5f, 1}, {-1, 0.5f, 1}, b.material(Color(0.5f)));
   b.quad({-0.2f, 0.4f, -0.2f}, {0.2f, 0.4f, -0.2f}, {0.2f, 0.4f, 0.2f}, {-0.2f, 0.4f, 0.2f}, b.material(Color(0), Color(1)));
@@ -175,7 +180,8 @@ TEST_CASE("aiming changes the number of photons behind mirrors, not their flux")
     SceneBuilder b;
     b.quad({-0.7f, -0.5f, 0.7f}, {0.7f, -0.5f, 0.7f}, {0.7f, -0.5f, -0.7f}, {-0.7f, -0.5f, -0.7f}, b.material(Color(0.5f)));
     b.sphere({0.3f, -0.3f, 0.2f}, 0.15f, b.mirror(), false, 12);
-    b.quad({-0.6f, -0.4f, -0.3f}, {-0.3f, -0.4f, -0.3f}, {-0.3f, -0.1f, -0.4f}, {-0.6f, -0.1f, -0.4f}, b.mirror({0.9f, 0.5f, 0.4f}));
+    b.quad({-0.6f, -0.4f, -0.3f}, {-0.3f, -0.4f, -0.3f}, {-0.3f, -0.1f, -0.4f}, {-0.6f, -0.1f, -0.4f},
+           b.mirror({0.9f, 0.5f, 0.4f}));
     return b;
   };
   Image sky;
@@ -185,7 +191,8 @@ TEST_CASE("aiming changes the number of photons behind mirrors, not their flux")
     CAPTURE(kind);
     SceneBuilder b = base();
     if (kind == 0) {
-      b.quad({-0.1f, 0.5f, -0.1f}, {0.1f, 0.5f, -0.1f}, {0.1f, 0.5f, 0.1f}, {-0.1f, 0.5f, 0.1f}, b.material({0, 0, 0}, {5, 4, 3}));
+      b.quad({-0.1f, 0.5f, -0.1f}, {0.1f, 0.5f, -0.1f}, {0.1f, 0.5f, 0.1f}, {-0.1f, 0.5f, 0.1f},
+             b.material({0, 0, 0}, {5, 4, 3}));
       b.data.materials.back().double_sided = true;
     }
     if (kind == 3) b.directional({0.3f, -1, 0.1f}, Color(2));
@@ -212,7 +219,8 @@ TEST_CASE("aiming changes the number of photons behind mirrors, not their flux")
       return total_flux(photons).x;
     });
     const Statistic blind = over_seeds(b.data, environment, [&](PrepareContext& context, const Scene& scene) {
-      const Photons all = trace_with(context, scene, path_automaton<AllButFirst>()), first = trace_with(context, scene, path_automaton<EmptyPath>());
+      const Photons all = trace_with(context, scene, path_automaton<AllButFirst>()),
+                    first = trace_with(context, scene, path_automaton<EmptyPath>());
       blind_hits += static_cast<double>(all.hits.size()) - static_cast<double>(first.hits.size());
       return total_flux(all).x - total_flux(first).x;
     });
@@ -237,7 +245,9 @@ TEST_CASE("secondary sources send out what they say, wherever they are bright") 
   b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f)), true, 1);
   Stage stage(b.data);
   const auto power = [&](const PathAutomaton& via, auto&& radiance) {
-    const auto source = [&](Tracer&, const SampleStream&, const Interaction& at) { return at.front ? radiance(at.at.p) : Color(0); };
+    const auto source = [&](Tracer&, const SampleStream&, const Interaction& at) {
+      return at.front ? radiance(at.at.p) : Color(0);
+    };
     const Photons photons = trace_secondary_photons(stage.context, 2, source, via, 100'000);
     const PhotonLedger& l = photons.ledger;
     CHECK(relative(l.emitted.x + l.roulette_gain.x, l.absorbed.x + l.escaped.x + l.roulette_loss.x) < 1e-12);
@@ -250,7 +260,8 @@ TEST_CASE("secondary sources send out what they say, wherever they are bright") 
   const auto pi = static_cast<double>(kPi);
   CHECK(power(path_automaton<EmptyPath>(), even) == doctest::Approx(6 * pi).epsilon(0.005));
   CHECK(power(path_automaton<AnyPath>(), even) == doctest::Approx(6 * pi).epsilon(0.005));
-  // 100 on a strip of 0.1 x 1 of the floor and on 0.1 x 0.01 of two walls and 1 x 0.01 of a third; y on the ceiling and the upper half of four walls.
+  // 100 on a strip of 0.1 x 1 of the floor and on 0.1 x 0.01 of two walls and 1 x 0.01 of a third; y on the ceiling and the
+  // upper half of four walls.
   const double strip = 100 * (0.1 + 2 * 0.001 + 0.01), rest = 0.5 + 4 * 0.125;
   CHECK(power(path_automaton<EmptyPath>(), uneven) == doctest::Approx(pi * (strip + rest)).epsilon(0.01));
 }

@@ -129,13 +129,16 @@ struct Bench {
     REQUIRE(waitpid(child, &status, 0) == child);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
   }
-  int run(std::vector<std::string> arguments, const std::function<void()>& before = {}) { return wait(start(std::move(arguments), before)); }
+  int run(std::vector<std::string> arguments, const std::function<void()>& before = {}) {
+    return wait(start(std::move(arguments), before));
+  }
 
   /// Starts a render of hours, and returns when its first pass has begun.
   pid_t start_rendering(std::vector<std::string> options) {
     options.insert(options.begin(), {"s.gltf", "--samples", "1000000", "--progress", "json"});
     const pid_t child = start(std::move(options));
-    for (int i = 0; i < 6000 && !contains(errors(), "\"render\""); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    for (int i = 0; i < 6000 && !contains(errors(), "\"render\""); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
     REQUIRE(contains(errors(), "\"render\""));
     return child;
   }
@@ -187,14 +190,15 @@ Picture read_picture(const fs::path& path) {
   picture.seed = header.typedAttribute<Imf::StringAttribute>("seed").value();
   picture.caustic_paths = header.typedAttribute<Imf::StringAttribute>("lightPaths.caustic").value();
   if (const auto* sets = header.findTypedAttribute<Imf::StringAttribute>("parameters")) picture.parameters = sets->value();
-  for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel) picture.channels.emplace_back(channel.name());
+  for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel)
+    picture.channels.emplace_back(channel.name());
   return picture;
 }
 
 TEST_CASE("a render leaves the picture, its layers and what made it") {
   Bench bench;
-  CHECK(bench.run({"s.gltf", "-o", "a.exr", "--size", "45x31", "--samples", "5", "--seed", "7", "--set", "photons.count=2k", "--stats", "a.json",
-                   "--preview", "a.png"}) == 0);
+  CHECK(bench.run({"s.gltf", "-o", "a.exr", "--size", "45x31", "--samples", "5", "--seed", "7", "--set", "photons.count=2k",
+                   "--stats", "a.json", "--preview", "a.png"}) == 0);
   const Picture picture = read_picture(bench.folder / "a.exr");
   CHECK(picture.width == 45);
   CHECK(picture.height == 31);
@@ -222,7 +226,8 @@ TEST_CASE("a render leaves the picture, its layers and what made it") {
 TEST_CASE("the same seed gives the same file with any number of threads") {
   Bench bench;
   for (const char* threads : {"1", "2", "5"}) {
-    REQUIRE(bench.run({"s.gltf", "-o", std::string("a") + threads + ".exr", "--size", "333x211", "--samples", "21", "--threads", threads}) == 0);
+    REQUIRE(bench.run({"s.gltf", "-o", std::string("a") + threads + ".exr", "--size", "333x211", "--samples", "21", "--threads",
+                       threads}) == 0);
   }
   const std::string one = read(bench.folder / "a1.exr");
   CHECK(!one.empty());
@@ -231,9 +236,14 @@ TEST_CASE("the same seed gives the same file with any number of threads") {
 }
 
 TEST_CASE("wrong use: status 2, one line") {
-  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
-           {}, {"s.gltf", "--bogus"}, {"s.gltf", "--samples", "-1"}, {"s.gltf", "--set", "photon.count=1"}, {"s.gltf", "-o", "s.gltf"},
-           {"s.gltf", "-o", "a.exr", "--stats", "./a.exr"}, {"s.gltf", "--preview", "p.png", "--env", "p.png"}}) {
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{},
+                                             {"s.gltf", "--bogus"},
+                                             {"s.gltf", "--samples", "-1"},
+                                             {"s.gltf", "--set", "photon.count=1"},
+                                             {"s.gltf", "-o", "s.gltf"},
+                                             {"s.gltf", "-o", "a.exr", "--stats", "./a.exr"},
+                                             {"s.gltf", "--preview", "p.png", "--env", "p.png"}}) {
     Bench bench;
     CHECK(bench.run(arguments) == 2);
     const std::vector<std::string> lines = bench.error_lines();
@@ -253,9 +263,12 @@ TEST_CASE("help and version go to standard output") {
 }
 
 TEST_CASE("failures: status 1, one line, no file") {
-  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
-           {"none.gltf"}, {"s.gltf", "-o", "none/a.exr"}, {"s.gltf", "-o", "."}, {"s.gltf", "--stats", "none/a.json"},
-           {"s.gltf", "--preview", "none/a.png"}, {"s.gltf", "-o", "/dev/full"}}) {
+  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{{"none.gltf"},
+                                                                                         {"s.gltf", "-o", "none/a.exr"},
+                                                                                         {"s.gltf", "-o", "."},
+                                                                                         {"s.gltf", "--stats", "none/a.json"},
+                                                                                         {"s.gltf", "--preview", "none/a.png"},
+                                                                                         {"s.gltf", "-o", "/dev/full"}}) {
     Bench bench;
     CHECK(bench.run(arguments) == 1);
     const std::vector<std::string> lines = bench.error_lines();
@@ -341,7 +354,8 @@ Ending end_after(pid_t child, int signal_number, int milliseconds) {
   int status = 0;
   rusage used{};
   REQUIRE(wait4(child, &status, 0, &used) == child);
-  const double processor = seconds_of(used.ru_utime) + seconds_of(used.ru_stime) - static_cast<double>(before.tv_sec) - 1e-9 * static_cast<double>(before.tv_nsec);
+  const double processor = seconds_of(used.ru_utime) + seconds_of(used.ru_stime) - static_cast<double>(before.tv_sec) -
+                           1e-9 * static_cast<double>(before.tv_nsec);
   return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), processor, watch.seconds()};
 }
 
@@ -350,7 +364,8 @@ TEST_CASE("after Ctrl-C or SIGTERM the picture so far is written, within two sec
     for (const int milliseconds : {300, 1500}) {
       Bench bench;
       bench.stub.microseconds_per_pixel = 20;
-      const Ending ending = end_after(bench.start_rendering({"--size", "160x100", "--stats", "a.json"}), signal_number, milliseconds);
+      const Ending ending =
+          end_after(bench.start_rendering({"--size", "160x100", "--stats", "a.json"}), signal_number, milliseconds);
       CHECK(ending.status == 130);
       CHECK(ending.processor_seconds < 2);
       const Picture picture = read_picture(bench.folder / "out.exr");

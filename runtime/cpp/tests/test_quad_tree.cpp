@@ -194,8 +194,7 @@ TEST_CASE("a dark face beside a lit one is joined to it") {
   const SceneData data = corner_scene();
   const auto patches = std::make_shared<const Patches>(data);
   QuadTree tree(patches);
-  set_face(
-      tree, 0, [](const DomainCell& c) { return larger_than(c, 3); }, [](const DomainCell&) { return Color(1); });
+  set_face(tree, 0, [](const DomainCell& c) { return larger_than(c, 3); }, [](const DomainCell&) { return Color(1); });
   Workers workers(2);
   const TriMesh mesh = reconstruct(tree, workers);
   CHECK(mesh.irradiance(0, {0.5f, 0.5f}) == Color(1));

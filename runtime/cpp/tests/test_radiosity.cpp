@@ -45,8 +45,8 @@ Range irradiance(const QuadTree& tree, Wanted&& wanted) {
 
 constexpr int kSpaces = 4;
 
-/// A closed space: a box of whole walls; of `pieces` x `pieces` a wall; a sphere of `rings`; a box with obstacles. Its sides are lit
-/// evenly, so all irradiance is rho / (1 - rho).
+/// A closed space: a box of whole walls; of `pieces` x `pieces` a wall; a sphere of `rings`; a box with obstacles. Its sides
+/// are lit evenly, so all irradiance is rho / (1 - rho).
 void check_even_space(int shape, int pieces, int rings, float error) {
   CAPTURE(shape);
   SceneBuilder b;

@@ -27,7 +27,9 @@ bool is_net(const std::vector<Vec2>& points, int m) {
     const int columns = 1 << i, rows = 1 << (m - i);
     std::set<std::pair<int, int>> cells;
     for (const Vec2& p : points)
-      if (!cells.emplace(static_cast<int>(p.x * static_cast<float>(columns)), static_cast<int>(p.y * static_cast<float>(rows))).second) return false;
+      if (!cells.emplace(static_cast<int>(p.x * static_cast<float>(columns)), static_cast<int>(p.y * static_cast<float>(rows)))
+               .second)
+        return false;
   }
   return true;
 }

@@ -45,7 +45,8 @@ TEST_CASE("a ray that leaves a triangle does not meet it again, grazing rays inc
       SurfacePosition at;
       scene.locate(hit, at);
       // Cosines from 1 down to 1e-6.
-      const float cosine = std::pow(10.0f, -6 * random.get1(1)), sine = std::sqrt(1 - cosine * cosine), phi = 2 * kPi * random.get1(2);
+      const float cosine = std::pow(10.0f, -6 * random.get1(1)), sine = std::sqrt(1 - cosine * cosine),
+                  phi = 2 * kPi * random.get1(2);
       const Vec3 local(sine * std::cos(phi), sine * std::sin(phi), k % 2 ? cosine : -cosine);
       const Vec3 w = make_frame(at.ng).to_world(local);
       again += scene.accel().intersect(spawn_ray(at, w), 0).triangle == t;

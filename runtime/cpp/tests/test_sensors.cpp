@@ -58,7 +58,8 @@ TEST_CASE("names put columns into any order, others are kept, earlier results ar
 
 TEST_CASE("byte order mark, comments, empty lines and all line ends") {
   for (const std::string end : {"\n", "\r\n", "\r"}) {
-    const SensorFile file = read("\xef\xbb\xbf# sensors" + end + "x,y,z,nx,ny,nz" + end + end + "  # one" + end + "1,2,3,0,0,1 " + end);
+    const SensorFile file =
+        read("\xef\xbb\xbf# sensors" + end + "x,y,z,nx,ny,nz" + end + end + "  # one" + end + "1,2,3,0,0,1 " + end);
     REQUIRE(file.sensors.size() == 1);
     CHECK(file.sensors[0].line == 5);
     CHECK(file.sensors[0].row == "1,2,3,0,0,1");

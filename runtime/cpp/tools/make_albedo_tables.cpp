@@ -68,14 +68,16 @@ int main(int argc, char** argv) {
       const double cell = 1 / (kColumns - 1.0), u = column * cell;
       facet_table[row][column][0] = static_cast<float>(std::max(integrate(cosine_of(u, alpha), alpha).deficit, 0.0));
       // At normal incidence hardly anything depends on the shift, in the rest of the last cell much does: extrapolate.
-      facet_table[row][column][1] = static_cast<float>(column < kColumns - 1 ? shift_at(u) : 2 * shift_at(1 - cell / 2) - shift_at(1 - cell));
+      facet_table[row][column][1] =
+          static_cast<float>(column < kColumns - 1 ? shift_at(u) : 2 * shift_at(1 - cell / 2) - shift_at(1 - cell));
     }
   }
 
   std::fprintf(out, "// Written by make_albedo_tables.\nconst float kFacets[kRows][kColumns][2] = {\n");
   for (const auto& row : facet_table) {
     std::fprintf(out, "{");
-    for (const auto& value : row) std::fprintf(out, "{%.9gf,%.9gf},", static_cast<double>(value[0]), static_cast<double>(value[1]));
+    for (const auto& value : row)
+      std::fprintf(out, "{%.9gf,%.9gf},", static_cast<double>(value[0]), static_cast<double>(value[1]));
     std::fprintf(out, "},\n");
   }
 
@@ -91,7 +93,8 @@ int main(int argc, char** argv) {
     for (int k = 0; k < kPoints; k++) {
       const double growth = std::exp(scale * (k + 0.5) / kPoints), mu = alpha * (growth - 1);
       const double weight = 2 * mu * alpha * growth * scale / kPoints;
-      const ln::FacetAlbedo a = facets(facet_table[at.row], facet_table[at.row + 1], at.fraction, static_cast<float>(alpha), static_cast<float>(mu));
+      const ln::FacetAlbedo a =
+          facets(facet_table[at.row], facet_table[at.row + 1], at.fraction, static_cast<float>(alpha), static_cast<float>(mu));
       sum.deficit += weight * a.deficit;
       sum.schlick += weight * a.schlick;
     }

@@ -26,7 +26,9 @@ struct RoughnessRow {
 };
 
 /// Column of cosine `mu`, from 0 to 1.
-inline float grazing_column(float alpha, float mu) { return std::sqrt(std::clamp(mu * (1 + alpha) / (mu + alpha), 0.0f, 1.0f)); }
+inline float grazing_column(float alpha, float mu) {
+  return std::sqrt(std::clamp(mu * (1 + alpha) / (mu + alpha), 0.0f, 1.0f));
+}
 
 /// Bilinear look-up between two rows of pairs of values, `t` from one to the other, at `column` in [0, 1].
 template <int Columns>

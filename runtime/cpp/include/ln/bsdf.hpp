@@ -13,11 +13,16 @@ namespace ln {
 
 /// Scattering events of a light path, as a set: D diffuse, G glossy, S ideal specular.
 enum class Events : std::uint8_t { none = 0, D = 1, G = 2, DG = 3, S = 4, all = 7 };
-constexpr Events operator&(Events a, Events b) { return static_cast<Events>(static_cast<unsigned>(a) & static_cast<unsigned>(b)); }
-constexpr Events operator|(Events a, Events b) { return static_cast<Events>(static_cast<unsigned>(a) | static_cast<unsigned>(b)); }
+constexpr Events operator&(Events a, Events b) {
+  return static_cast<Events>(static_cast<unsigned>(a) & static_cast<unsigned>(b));
+}
+constexpr Events operator|(Events a, Events b) {
+  return static_cast<Events>(static_cast<unsigned>(a) | static_cast<unsigned>(b));
+}
 constexpr bool any(Events e) { return e != Events::none; }
 
-/// What is carried along the ray: `radiance` (traced from the eye) is scaled by 1/eta^2 where it is refracted, `flux` (traced from a light) is not.
+/// What is carried along the ray: `radiance` (traced from the eye) is scaled by 1/eta^2 where it is refracted, `flux` (traced
+/// from a light) is not.
 enum class Carried : std::uint8_t { radiance, flux };
 
 class DielectricTable;
@@ -26,17 +31,17 @@ class DielectricTable;
 struct BsdfParameters {
   Color base_color{1};
   float metallic = 0, roughness = 1;
-  float specular = 1;         // KHR_materials_specular
+  float specular = 1;  // KHR_materials_specular
   Color specular_color{1};
-  float ior = 1.5f;           // KHR_materials_ior; 0: infinite
-  float transmission = 0;     // KHR_materials_transmission
-  bool solid = false;         // KHR_materials_volume: the surface bounds a solid; otherwise it is a thin wall
+  float ior = 1.5f;        // KHR_materials_ior; 0: infinite
+  float transmission = 0;  // KHR_materials_transmission
+  bool solid = false;      // KHR_materials_volume: the surface bounds a solid; otherwise it is a thin wall
 };
 
 struct BsdfSample {
   Vec3 wi{0};
-  float pdf_w = 0;   // density of all smooth lobes of the mask together; 0: an ideal specular direction
-  Color weight{0};   // BSDF * |cos(wi)| / pdf_w, of an S lobe: its value over its selection probability
+  float pdf_w = 0;              // density of all smooth lobes of the mask together; 0: an ideal specular direction
+  Color weight{0};              // BSDF * |cos(wi)| / pdf_w, of an S lobe: its value over its selection probability
   Events event = Events::none;  // kind of the lobe that was picked
 };
 
@@ -152,8 +157,8 @@ class Bsdf {
   Wall wall_ = Wall::opaque;
   bool rough_ = false;
   bool outside_ = true;
-  Color diffuse_{0};          // Lambertian: albedo / pi; else share * albedo / (pi (1 - average albedo of the layer above))
-  Color base_{0};             // share * albedo of the diffuse base
+  Color diffuse_{0};  // Lambertian: albedo / pi; else share * albedo / (pi (1 - average albedo of the layer above))
+  Color base_{0};     // share * albedo of the diffuse base
   float alpha_ = 0;
   albedo_table::Row row_;
   // The specular layer above the diffuse base: Schlick's Fresnel, and what returns after several bounces, per deficit.
@@ -162,7 +167,7 @@ class Bsdf {
   // All reflection from opaque facets, metal and dielectric by their shares.
   Color facet_f0_{0}, multiple_up_{0};
   float facet_f90_ = 0;
-  float multiple_norm_ = 0;   // 1 / (pi average deficit)
+  float multiple_norm_ = 0;  // 1 / (pi average deficit)
   // Transmission.
   float transmission_ = 0;    // share
   float ior_ = 1;             // index inside over the index outside

@@ -2,8 +2,8 @@
 // Wires that are kept in files between runs.
 //
 // A cache holds what one wire stores, and what it was made from: the scene, the part of the network that leads to it with its
-// parameters, the sources of its operators and of this library, and the seed. Where any of them differs, or the file is damaged, it is not used, a note says why, and the wire is
-// computed and written again.
+// parameters, the sources of its operators and of this library, and the seed. Where any of them differs, or the file is
+// damaged, it is not used, a note says why, and the wire is computed and written again.
 
 #include <cstdint>
 #include <memory>
@@ -37,7 +37,8 @@ class Fingerprint {
     add(&value, sizeof value);
   }
   template <class T>
-    requires std::has_unique_object_representations_v<T> || std::is_same_v<T, Vec2> || std::is_same_v<T, Vec3> || std::is_same_v<T, Vec4>
+    requires std::has_unique_object_representations_v<T> || std::is_same_v<T, Vec2> || std::is_same_v<T, Vec3> ||
+             std::is_same_v<T, Vec4>
   void add(const std::vector<T>& values) {
     add(std::uint64_t{values.size()});
     add(values.data(), values.size() * sizeof(T));
@@ -121,7 +122,8 @@ const char* cache_name(const TriMesh*);
 void encode(CacheBytes& out, const TriMesh& mesh);
 void decode(CacheReader& in, PrepareContext& context, TriMesh& mesh);
 
-/// The payload of a cache that was made from `key`; throws Error with the reason if there is none. An empty reason: no such file.
+/// The payload of a cache that was made from `key`; throws Error with the reason if there is none. An empty reason: no such
+/// file.
 std::string load_cache(const std::string& path, std::string_view representation, const CacheKey& key);
 /// Writes a cache; a failure is a warning.
 void save_cache(const std::string& path, std::string_view representation, const CacheKey& key, const std::string& payload);

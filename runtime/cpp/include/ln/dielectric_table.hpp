@@ -21,7 +21,8 @@ class DielectricTable {
     const float y = row_of(roughness) * static_cast<float>(rows_ - 1);
     const int row = static_cast<int>(y), next = std::min(row + 1, rows_ - 1);
     const auto& side = deficit_[outside];
-    return lookup<kColumns>(side[row].data(), side[next].data(), y - static_cast<float>(row), column(roughness * roughness, mu));
+    return lookup<kColumns>(side[row].data(), side[next].data(), y - static_cast<float>(row),
+                            column(roughness * roughness, mu));
   }
 
   /// Its cosine-weighted average over the hemisphere.

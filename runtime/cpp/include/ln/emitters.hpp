@@ -86,8 +86,8 @@ class Emitters {
   float environment_pdf_w(const SurfacePosition& at, const Vec3& n, const Vec3& w) const;
 
   /// A particle, its emitter chosen by power. Directional light and the environment shine through the disk that the
-  /// scene's bounding sphere fills. With `aim`, light that meets nothing that is aimed at is left out: its particles are black, or
-  /// there are none of them and the others stand for less power.
+  /// scene's bounding sphere fills. With `aim`, light that meets nothing that is aimed at is left out: its particles are black,
+  /// or there are none of them and the others stand for less power.
   PhotonEmission emit(float u_pick, const Vec2& u_position, const Vec2& u_direction, const PhotonAim* aim = nullptr) const;
   /// Power of all emitters [W / unit^2]; of distant light, what passes the scene's bounding sphere.
   const Color& total_power() const { return total_power_; }

@@ -38,7 +38,8 @@ inline Fresnel fresnel_dielectric(float cos_i, float eta) {
   return {0.5f * (sqr((cos_i - eta * cos_t) / s) + sqr((eta * cos_i - cos_t) / p)), transmittance, cos_t};
 }
 
-/// Cosine-weighted average of the reflectance over the hemisphere in front of a denser medium (fit of Kulla and Conty 2017, error < 0.1 %).
+/// Cosine-weighted average of the reflectance over the hemisphere in front of a denser medium (fit of Kulla and Conty 2017,
+/// error < 0.1 %).
 inline float fresnel_average(float eta) { return (eta - 1) / (4.08567f + 1.00071f * eta); }
 
 /// What a thin slab does, given what one of its faces reflects and transmits: R + T^2 R (1 + R^2 + R^4 + ...), and the rest.

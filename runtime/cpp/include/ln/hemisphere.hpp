@@ -21,17 +21,17 @@ struct HemisphereGrid {
 
 /// What is seen through one cell.
 struct HemisphereCell {
-  Color radiance{0};            // [W/(m^2 sr)]
-  float distance = kInfinity;   // [normalised units]
+  Color radiance{0};           // [W/(m^2 sr)]
+  float distance = kInfinity;  // [normalised units]
 };
 
 /// Irradiance at a point and how it changes around it. The gradients hold a vector a channel, in world space.
 struct IrradianceSample {
-  Color irradiance{0};         // [W/m^2]
-  glm::mat3 rotation{0.0f};    // by the angle about an axis: a normal `m` near `n` gets (n x m) * rotation more
-  glm::mat3 translation{0.0f}; // [W/m^2 a unit]: a point `d` away gets d * translation more
-  float distance = kInfinity;  // harmonic mean of the distances of what is seen
-  float nearest = kInfinity;   // the least of them
+  Color irradiance{0};          // [W/m^2]
+  glm::mat3 rotation{0.0f};     // by the angle about an axis: a normal `m` near `n` gets (n x m) * rotation more
+  glm::mat3 translation{0.0f};  // [W/m^2 a unit]: a point `d` away gets d * translation more
+  float distance = kInfinity;   // harmonic mean of the distances of what is seen
+  float nearest = kInfinity;    // the least of them
 };
 
 /// The irradiance of a surface with the local frame `frame`; `cells` ring by ring.

@@ -59,10 +59,11 @@ class IrradianceRecords {
   /// Do the records whose error at the point is allowed weigh enough?
   bool covers(const Vec3& p, const Vec3& n) const;
 
-  /// Calls `visit(record, weight)` for records near the point. Weights fall to 0 with the error, like Tabellion and Lamorlette's
-  /// (2004), but with its third power: where irradiance is curved, gradients lead astray with the square of the distance. `limit` <=
-  /// kFar: the error at which they get to 0, in units of what is allowed. A record that is used farther away than it should be, as
-  /// records in corners and gaps are, gives way to others. Returns how well the point is covered: enough, or not.
+  /// Calls `visit(record, weight)` for records near the point. Weights fall to 0 with the error, like Tabellion and
+  /// Lamorlette's (2004), but with its third power: where irradiance is curved, gradients lead astray with the square of the
+  /// distance. `limit` <= kFar: the error at which they get to 0, in units of what is allowed. A record that is used farther
+  /// away than it should be, as records in corners and gaps are, gives way to others. Returns how well the point is covered:
+  /// enough, or not.
   template <class Visit>
   float visit(const Vec3& p, const Vec3& n, float limit, Visit&& visit) const {
     float sum = 0;
@@ -79,7 +80,8 @@ class IrradianceRecords {
 
   static constexpr float kOverlap = 1.4f;  // usual limit: neighbouring records overlap, so that no border shows
   static constexpr float kFar = 3.0f;
-  static constexpr float kEnough = 0.1f;  // cover: one record suffices, unless it is far out of its depth, as those in narrow gaps are
+  static constexpr float kEnough =
+      0.1f;  // cover: one record suffices, unless it is far out of its depth, as those in narrow gaps are
 
  private:
   struct Node {
@@ -139,10 +141,10 @@ void write_tap(const TapFile& tap, const IrradianceRecordSets& sets);
 /// Makes a record's sample: the receiver and a key for its random numbers.
 using SampleIrradiance = FunctionRef<IrradianceSample(Tracer&, const Receiver&, std::uint32_t key)>;
 
-/// Adds records until all of `wanted` are covered; returns where, in the order of the records. Batches are chosen by hash and sampled on
-/// all cores with the records so far only read, so that the result does not depend on the number of threads.
-std::vector<Receiver> cover(PrepareContext& context, IrradianceRecords& records, const std::vector<Receiver>& wanted, std::uint32_t key,
-                            SampleIrradiance sample);
+/// Adds records until all of `wanted` are covered; returns where, in the order of the records. Batches are chosen by hash and
+/// sampled on all cores with the records so far only read, so that the result does not depend on the number of threads.
+std::vector<Receiver> cover(PrepareContext& context, IrradianceRecords& records, const std::vector<Receiver>& wanted,
+                            std::uint32_t key, SampleIrradiance sample);
 
 /// Records that get their light from each other, bounce after bounce: E_(n+1) = T(direct + E_n). As the same directions are
 /// followed each time, the difference of two rounds is the light of one more bounce, without noise of its own.
@@ -164,8 +166,8 @@ class BounceSeries {
   DVec3 last_sum_{0}, ratio_{0};        // of irradiances: of the last bounce; and its ratio to the one before
 };
 
-/// The diffuse surfaces that the eye sees at the centres of pixels (x, y) which `choose` picks, through specular ones too, in the
-/// order of pixels. Camera rays at the cost of `node`.
+/// The diffuse surfaces that the eye sees at the centres of pixels (x, y) which `choose` picks, through specular ones too, in
+/// the order of pixels. Camera rays at the cost of `node`.
 std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, FunctionRef<bool(int x, int y)> choose,
                                      FunctionRef<bool(const Receiver&)> keep);
 

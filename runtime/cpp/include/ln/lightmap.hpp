@@ -34,7 +34,8 @@ class Lightmap {
       if (texels_[i] == kNone) continue;
       const Chart& chart = charts_[texels_[i]];
       const auto width = static_cast<std::size_t>(side_);
-      places.push_back({hit(chart, static_cast<int>(i % width), static_cast<int>(i / width), Vec2(kInside)), Patches::is_front(chart.face)});
+      places.push_back(
+          {hit(chart, static_cast<int>(i % width), static_cast<int>(i / width), Vec2(kInside)), Patches::is_front(chart.face)});
     }
   }
 
@@ -45,7 +46,8 @@ class Lightmap {
     for (int y = tile.y0; y < tile.y1; ++y) {
       for (int x = tile.x0; x < tile.x1 && !tile.stopped(); ++x) {
         const std::uint32_t number = chart_at(x, y);
-        const std::uint32_t key = hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)) + kFirstKey, seed_hash);
+        const std::uint32_t key =
+            hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)) + kFirstKey, seed_hash);
         for_samples(key, tile.first_sample, end, tracer, [&](const SampleStream& random) {
           film.add(x, y, random.index(), number == kNone ? Color(0) : sample(charts_[number], x, y, tracer, random, wire));
         });
@@ -66,7 +68,9 @@ class Lightmap {
     int x = 0, y = 0, width = 2, height = 2;  // texels: its columns are s, its rows t
   };
 
-  std::uint32_t chart_at(int x, int y) const { return texels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(side_) + static_cast<std::size_t>(x)]; }
+  std::uint32_t chart_at(int x, int y) const {
+    return texels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(side_) + static_cast<std::size_t>(x)];
+  }
 
   /// A point of [0,1] around texel `i` of `n`, evenly distributed half-way to its neighbours; only inwards at the ends.
   static float around(int i, int n, float random) {

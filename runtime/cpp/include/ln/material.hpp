@@ -41,6 +41,7 @@ Events possible_events(const SceneData& data, const Material& material);
 
 /// The normal of KHR_materials normal maps in world space, or `normal` where there is none. `normal`: the interpolated
 /// normal of the front side.
-Vec3 mapped_normal(const SceneData& data, const Material& material, const VertexAttributes& at, std::uint32_t triangle, const Vec3& normal);
+Vec3 mapped_normal(const SceneData& data, const Material& material, const VertexAttributes& at, std::uint32_t triangle,
+                   const Vec3& normal);
 
 }  // namespace ln

@@ -58,7 +58,8 @@ struct Frame {
   Vec3 to_world(const Vec3& v) const { return s * v.x + t * v.y + n * v.z; }
 };
 
-/// A frame around the unit vector `n`, continuous but for n.z = 0 (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
+/// A frame around the unit vector `n`, continuous but for n.z = 0 (Duff et al. 2017, "Building an Orthonormal Basis,
+/// Revisited").
 inline Frame make_frame(const Vec3& n) {
   const float sign = std::copysign(1.0f, n.z);
   const float a = -1.0f / (sign + n.z);

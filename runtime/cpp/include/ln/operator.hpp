@@ -62,7 +62,9 @@ LN_INLINE Color with_step(Via via, const Scene& scene, std::uint32_t part, Work&
       if constexpr (any(kEvents) && occurs(kEvents))
         if (allowed == kEvents) answer = work.template operator()<kEvents>();
     };
-    [&]<std::size_t... kBits>(std::index_sequence<kBits...>) { (try_set.template operator()<kBits>(), ...); }(std::make_index_sequence<8>{});
+    [&]<std::size_t... kBits>(std::index_sequence<kBits...>) {
+      (try_set.template operator()<kBits>(), ...);
+    }(std::make_index_sequence<8>{});
     return answer;
   }
 }

@@ -28,13 +28,13 @@ struct Options {
   std::optional<double> error;           // estimated relMSE of the picture
   bool default_samples = false;          // none was given
   std::uint64_t seed = 0;
-  int threads = 1;  // parse_options: all processors that this process may use
-  std::vector<std::string> sets;  // "node.parameter=value" as given; the slots hold the values already
+  int threads = 1;                                         // parse_options: all processors that this process may use
+  std::vector<std::string> sets;                           // "node.parameter=value" as given; the slots hold the values already
   std::string stats_path, preview_path, environment_path;  // empty: none
-  bool verify_paths = false;      // no picture: compare the wires with their light paths
+  bool verify_paths = false;                               // no picture: compare the wires with their light paths
   ProgressMode progress = ProgressMode::automatic;
   Units units = Units::radiometric;
-  int lightmap_side = 512;  // texels
+  int lightmap_side = 512;          // texels
   bool print_letters = false;       // instead of rendering: for `lnc compile --scene`
   std::vector<const char*> unused;  // options that were given, though this network has nothing to do with them
 };

@@ -10,9 +10,9 @@
 namespace ln {
 
 /// A file that appears under its name only when `commit` has succeeded. It is written under a temporary name in the same
-/// folder, synchronised, closed with a check and renamed; the folder is synchronised too. All functions throw Error with the path
-/// and the cause ("out/a.exr: cannot write: No space left on device"). Without `commit` nothing is left behind.
-/// A symbolic link is followed. A device (/dev/null) is written in place.
+/// folder, synchronised, closed with a check and renamed; the folder is synchronised too. All functions throw Error with the
+/// path and the cause ("out/a.exr: cannot write: No space left on device"). Without `commit` nothing is left behind. A symbolic
+/// link is followed. A device (/dev/null) is written in place.
 class OutputFile {
  public:
   explicit OutputFile(std::string path);

@@ -64,8 +64,8 @@ class Workers {
   void run(FunctionRef<void(int worker)> body);
 
   /// Calls `body(begin, end, worker)` for each chunk of `grain` indices of [0, n) and waits. Chunks start in order. After an
-  /// exception no further chunk starts, and that of the lowest chunk, always the same one, is rethrown. Throws Interrupted if the
-  /// user asked to stop; then some chunks have not run. From inside a body: runs on the calling worker alone.
+  /// exception no further chunk starts, and that of the lowest chunk, always the same one, is rethrown. Throws Interrupted if
+  /// the user asked to stop; then some chunks have not run. From inside a body: runs on the calling worker alone.
   void for_chunks(std::size_t n, std::size_t grain, FunctionRef<void(std::size_t begin, std::size_t end, int worker)> body);
 
   /// Calls `body(index)` for each index of [0, n), `grain` of them in a row.

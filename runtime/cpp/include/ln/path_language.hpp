@@ -30,7 +30,9 @@ class PathLanguage {
   // Letters, in the order of lnc/paths/language.py.
   int emitter(bool delta, TagSet tags) const { return (delta ? 1 : 0) * combinations() + combination(tags); }
   /// `event`: 0 to 2 for D, G, S.
-  int event(int event, TagSet tags) const { return (2 + event) * combinations() + combination(tags); }
+  int event(int event, TagSet tags) const { return event_at(event, combination(tags)); }
+  /// On surfaces with a combination of tags.
+  int event_at(int event, int combination) const { return (2 + event) * combinations() + combination; }
   int eye() const { return letters_ - 1; }
 
   /// The state after a letter; -1: no path goes on.

@@ -17,7 +17,9 @@ inline std::uint32_t pack_unit(const Vec3& v) {
     y = (1 - std::abs(x)) * std::copysign(1.0f, y);
     x = folded;
   }
-  const auto steps = [](float c) { return static_cast<std::uint32_t>(std::min(std::max((c + 1) * 32767.5f + 0.5f, 0.0f), 65535.0f)); };
+  const auto steps = [](float c) {
+    return static_cast<std::uint32_t>(std::min(std::max((c + 1) * 32767.5f + 0.5f, 0.0f), 65535.0f));
+  };
   return steps(x) << 16 | steps(y);
 }
 
@@ -82,10 +84,10 @@ struct PackedNormal {
 /// A hit of a particle on a surface that can scatter it diffusely or glossily.
 struct Photon {
   Vec3 position{0};
-  std::uint32_t wi = 0;        // packed unit vector to where the light came from
-  PackedNormal normal;         // geometric, on the side of arrival
+  std::uint32_t wi = 0;  // packed unit vector to where the light came from
+  PackedNormal normal;   // geometric, on the side of arrival
   std::uint32_t triangle = 0;
-  PackedColor flux;            // arriving, before it is scattered [W / SceneData::unit^2]; see trace_photons
+  PackedColor flux;  // arriving, before it is scattered [W / SceneData::unit^2]; see trace_photons
 };
 static_assert(sizeof(Photon) == 32);
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "ln/photon_tracer.hpp"
+#include "ln/scene.hpp"
 
 namespace ln {
 
@@ -25,6 +26,9 @@ struct Neighbourhood {
   Vec3 normal{0, 0, 1};  // geometric, on the side where light is wanted; unit length
   bool front = true;     // that side is the front
 };
+
+/// Of the receiver of a request.
+inline Neighbourhood neighbourhood(const Interaction& at) { return {at.at.p, at.front ? at.at.ng : -at.at.ng, at.front}; }
 
 class PhotonMap {
  public:

@@ -54,18 +54,19 @@ struct Photons {
   PhotonLedger ledger;
 };
 
-/// Traces `count` particles from `light`, aimed at what can start a path of `via`, and keeps the hits at which the path so far matches `via` and the surface can
-/// scatter by D or G. The flux that is kept is weighted by |cos to the shading normal / cos to the geometric normal| and by
-/// 1 / coverage, so that its density over the surface is the irradiance that the surface's BSDF sees.
-/// Same scene, seed and count: same bits, whatever the number of threads. Throws Error if the photons would take more than
-/// a third of the free memory.
-Photons trace_photons(PrepareContext& context, NodeId node, const Emitters& light, const PathAutomaton& via, std::uint64_t count);
+/// Traces `count` particles from `light`, aimed at what can start a path of `via`, and keeps the hits at which the path so far
+/// matches `via` and the surface can scatter by D or G. The flux that is kept is weighted by |cos to the shading normal / cos
+/// to the geometric normal| and by 1 / coverage, so that its density over the surface is the irradiance that the surface's BSDF
+/// sees. Same scene, seed and count: same bits, whatever the number of threads. Throws Error if the photons would take more
+/// than a third of the free memory.
+Photons trace_photons(PrepareContext& context, NodeId node, const Emitters& light, const PathAutomaton& via,
+                      std::uint64_t count);
 
 /// Radiance [W/(m^2 sr)] that leaves a point towards `wo`, or an estimate of it.
 using RadianceSource = FunctionRef<Color(Tracer&, const SampleStream&, const Interaction& at)>;
 
-/// The same from all sides of surfaces that scatter diffusely, which send out what `source` says: secondary sources. Where it is
-/// bright is found out first, by some of `count` / 16 requests.
+/// The same from all sides of surfaces that scatter diffusely, which send out what `source` says: secondary sources. Where it
+/// is bright is found out first, by some of `count` / 16 requests.
 Photons trace_secondary_photons(PrepareContext& context, NodeId node, const RadianceSource& source, const PathAutomaton& via,
                                 std::uint64_t count);
 

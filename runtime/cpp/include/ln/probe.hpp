@@ -36,7 +36,8 @@ class Probe {
   /// Adds the sensors that are on surfaces.
   void add_places(const Scene& scene, std::vector<MeasuredPlace>& places) const {
     for (const Place& place : places_)
-      if (place.hit.found()) places.push_back({place.hit, Interaction(scene, place.hit, place.position, place.normal, white_receiver()).front});
+      if (place.hit.found())
+        places.push_back({place.hit, Interaction(scene, place.hit, place.position, place.normal, white_receiver()).front});
   }
 
   /// Adds the tile's samples of its sensors, which are the pixels of a picture of one row. The film is kept for
@@ -50,11 +51,12 @@ class Probe {
       for (std::uint32_t set = 0; set < kSets; ++set) {
         const auto share = [set](std::uint32_t samples) { return (samples + kSets - 1 - set) / kSets; };
         const std::uint32_t key = hash32(hash32(static_cast<std::uint32_t>(i), kFirstKey + set), seed_hash);
-        for_samples(key, share(tile.first_sample), share(tile.first_sample + tile.sample_count), tracer, [&](const SampleStream& random) {
-          const Color irradiance = sample_irradiance(tracer, random, at, wire);
-          sum.add(set, irradiance);
-          film.add(i, 0, random.index() * kSets + set, irradiance);
-        });
+        for_samples(key, share(tile.first_sample), share(tile.first_sample + tile.sample_count), tracer,
+                    [&](const SampleStream& random) {
+                      const Color irradiance = sample_irradiance(tracer, random, at, wire);
+                      sum.add(set, irradiance);
+                      film.add(i, 0, random.index() * kSets + set, irradiance);
+                    });
       }
     }
     tracer.enter(Tracer::kIdle);
@@ -84,7 +86,8 @@ class Probe {
         ++broken;
         return;
       }
-      for (int c = 0; c < 3; ++c) irradiance[static_cast<std::size_t>(c)] += static_cast<double>(value[static_cast<std::size_t>(c)]);
+      for (int c = 0; c < 3; ++c)
+        irradiance[static_cast<std::size_t>(c)] += static_cast<double>(value[static_cast<std::size_t>(c)]);
       luminance[set] += static_cast<double>(ln::luminance(value));
     }
 

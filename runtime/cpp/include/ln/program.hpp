@@ -70,9 +70,9 @@ struct TapInfo {
 
 /// A wire whose irradiance is measured at the sensors of a file.
 struct ProbeInfo {
-  const char* wire;     // as the network has it
-  const char* sensors;  // file that is read
-  const char* file;     // file that is written
+  const char* wire;          // as the network has it
+  const char* sensors;       // file that is read
+  const char* file;          // file that is written
   bool on_surfaces = false;  // the wire is known on surfaces only, not in free space
 };
 
@@ -98,8 +98,8 @@ struct ProgramInfo {
   std::span<const LightmapInfo> lightmaps = {};
   bool has_image = true;
   std::span<const SkipRule> skip_rules = {};
-  std::span<const int> path_tags = {};  // numbers of the tags that letters tell apart
-  const char* compiled_for = nullptr;   // the only scene that the program was compiled for, and those that have no more
+  std::span<const int> path_tags = {};      // numbers of the tags that letters tell apart
+  const char* compiled_for = nullptr;       // the only scene that the program was compiled for, and those that have no more
   std::span<const LetterNeed> absent = {};  // what that scene does not have
 
   /// Are there camera rays?

@@ -17,6 +17,15 @@ namespace ln {
 void note(std::string_view message);
 void warning(std::string_view message);
 
+/// While one exists, nothing is noted: for work that is done again and again.
+class NotesOff {
+ public:
+  NotesOff();
+  ~NotesOff();
+  NotesOff(const NotesOff&) = delete;
+  NotesOff& operator=(const NotesOff&) = delete;
+};
+
 /// "note: caustic: skipped, REASON"; with --progress json an event of its own.
 void note_skipped(std::string_view node, std::string_view reason);
 
@@ -38,9 +47,9 @@ class Progress {
   void phase(std::string_view name, std::string_view detail = {});
 
   struct State {
-    double fraction = -1;                     // of the phase; below 0: unknown
-    std::optional<std::uint32_t> samples;     // per pixel so far
-    std::optional<double> error;              // estimated relMSE
+    double fraction = -1;                  // of the phase; below 0: unknown
+    std::optional<std::uint32_t> samples;  // per pixel so far
+    std::optional<double> error;           // estimated relMSE
   };
   /// True if it is time for an update; cheap, from any thread.
   bool due() const;

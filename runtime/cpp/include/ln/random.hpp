@@ -11,7 +11,8 @@ class Random {
  public:
   /// Sequences of different keys and numbers are independent.
   Random(std::uint32_t key, std::uint64_t number)
-      : state_((std::uint64_t{hash32(key, static_cast<std::uint32_t>(number >> 32))} << 32 | hash32(key ^ 0x9e3779b9u, static_cast<std::uint32_t>(number)))) {}
+      : state_((std::uint64_t{hash32(key, static_cast<std::uint32_t>(number >> 32))} << 32 |
+                hash32(key ^ 0x9e3779b9u, static_cast<std::uint32_t>(number)))) {}
 
   std::uint32_t bits() {
     std::uint64_t x = state_ += 0x9e3779b97f4a7c15u;

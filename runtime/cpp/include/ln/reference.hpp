@@ -1,9 +1,9 @@
 #pragma once
 // The reference: a plain, slow tracer that keeps the light paths of an expression and nothing else.
 //
-// From the eye, a set of states of the language says what has been seen (PathLanguage::States). At each surface every event that
-// some beginning of a path fits to is followed by itself: its lobe alone is evaluated and sampled, so that no light is labelled
-// wrongly. Each path is found in one way, by its first and last events:
+// From the eye, a set of states of the language says what has been seen (PathLanguage::States). At each surface every event
+// that some beginning of a path fits to is followed by itself: its lobe alone is evaluated and sampled, so that no light is
+// labelled wrongly. Each path is found in one way, by its first and last events:
 //   L@area ... E               from the eye, by hits and light samples with the balance heuristic
 //   L@delta (D|G) ... E        from the eye, by light samples
 //   L@delta S ... (D|G) E      particles from the light, connected to the camera (before the picture; `particles.count`)

@@ -44,12 +44,13 @@ class EmitterClasses {
 /// For each event: may it be next?
 using EventChoice = std::array<bool, kEventCount>;
 
-/// Probabilities with which one of the events is chosen that are allowed and that the surface has: about by albedo; all 0: none.
+/// Probabilities with which one of the events is chosen that are allowed and that the surface has: about by albedo; all 0:
+/// none.
 std::array<float, kEventCount> event_probabilities(const Interaction& at, const EventChoice& allowed);
 
 /// A scattering event and the direction in which the light, or the search for it, goes on.
 struct Scattering {
-  int event = -1;   // -1: absorbed
+  int event = -1;  // -1: absorbed
   Vec3 direction{0};
   Color weight{0};  // BSDF * |cos| / density, of this event
   float pdf_w = 0;  // density of event and direction together; 0: an ideal specular direction
@@ -66,8 +67,8 @@ Color scattered(const Interaction& at, const Vec3& w, int event, Carried carried
 float arrival_factor(const Interaction& at);
 float departure_factor(const Interaction& at, const Vec3& w);
 
-/// Traces one particle. `arrive(at, ray, flux)` is told where it is and the flux that arrives [W / unit^2], and returns the events
-/// by which it may go on; `leave(at, event)` is told which it took.
+/// Traces one particle. `arrive(at, ray, flux)` is told where it is and the flux that arrives [W / unit^2], and returns the
+/// events by which it may go on; `leave(at, event)` is told which it took.
 template <class Arrive, class Leave>
 void trace_particle(Tracer& tracer, NodeId node, const Emitters& emitters, Random& random, Arrive&& arrive, Leave&& leave) {
   const float pick = random.get1();
@@ -101,18 +102,21 @@ void trace_particle(Tracer& tracer, NodeId node, const Emitters& emitters, Rando
 /// A particle at a surface, on a path of a language.
 struct Arrival {
   const Interaction& at;
-  const Ray& ray;   // that led here
-  Color flux;       // that arrives [W / unit^2]
-  int state;        // of the language so far
-  int last_event;   // -1: straight from the emitter
+  const Ray& ray;  // that led here
+  Color flux;      // that arrives [W / unit^2]
+  int state;       // of the language so far
+  int last_event;  // -1: straight from the emitter
 };
 
 /// The same for the paths of a language alone; `visit(arrival)` returns the events that it wants to go on by.
 template <class Visit>
-void trace_particle(Tracer& tracer, NodeId node, const PathLanguage& language, const EmitterClass& source, Random& random, Visit&& visit) {
+void trace_particle(Tracer& tracer, NodeId node, const PathLanguage& language, const EmitterClass& source, Random& random,
+                    Visit&& visit) {
   int state = language.after(0, source.letter), last_event = -1;
   if (state < 0) return;
-  const auto next = [&](const Interaction& at, int event) { return language.after(state, language.event(event, tracer.scene().part_tags(at.part))); };
+  const auto next = [&](const Interaction& at, int event) {
+    return language.after(state, language.event(event, tracer.scene().part_tags(at.part)));
+  };
   trace_particle(
       tracer, node, *source.emitters, random,
       [&](const Interaction& at, const Ray& ray, const Color& flux) {

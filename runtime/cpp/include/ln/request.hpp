@@ -9,9 +9,9 @@ namespace ln {
 /// A direction sampled from a BSDF and what the ray found there.
 struct BsdfRay {
   Ray ray;
-  Hit hit;           // not found: the ray left the scene
-  Color weight{0};   // BSDF * |cos| / density
-  float pdf_w = 0;   // 0: a specular direction
+  Hit hit;          // not found: the ray left the scene
+  Color weight{0};  // BSDF * |cos| / density
+  float pdf_w = 0;  // 0: a specular direction
   Events event = Events::none;
 };
 
@@ -26,8 +26,8 @@ class Request {
   static constexpr Events receives = kReceives;
   static constexpr Events scene_events = kScene;
 
-  Request(Tracer& tracer, const SampleStream& random, const Interaction& at, const Color& beta, std::uint32_t depth, RayKind kind,
-          std::uint32_t steps = 0)
+  Request(Tracer& tracer, const SampleStream& random, const Interaction& at, const Color& beta, std::uint32_t depth,
+          RayKind kind, std::uint32_t steps = 0)
       : tracer_(tracer), random_(random), at_(at), beta_(beta), depth_(depth), steps_(steps), kind_(kind) {}
 
   Tracer& tracer() { return tracer_; }
@@ -59,10 +59,13 @@ class Request {
     return at_.front ? at_.at.ng : -at_.at.ng;
   }
 
-  /// Radiance that the irradiance `E` [W/m^2] becomes: diffuse reflection only.
-  Color scatter_irradiance(const Color& E) const {
-    if constexpr (!any(kReceives & Events::D)) return Color(0);
-    return bsdf().diffuse_reflectance(at_.wo_local) * E * kInvPi;
+  /// Radiance that an irradiance becomes: diffuse reflection only. `irradiance(at)` [W/m^2] is asked where there is any.
+  template <class Irradiance>
+  LN_INLINE Color scatter_irradiance(Irradiance&& irradiance) const {
+    if constexpr (any(kReceives & Events::D)) {
+      if (any(bsdf().events() & Events::D)) return bsdf().diffuse_reflectance(at_.wo_local) * irradiance(at_) * kInvPi;
+    }
+    return Color(0);
   }
 
   /// Is the way to an emitter free?

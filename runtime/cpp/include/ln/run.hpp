@@ -42,12 +42,13 @@ inline constexpr NodeId kEye = 0;
 class PrepareStep {
  public:
   /// `environment`: what lights the scene from outside, or null. `caches`: may files from earlier runs be used and written?
-  PrepareStep(PrepareContext& context, RunContext& run, std::vector<double>& seconds, const Image* environment, bool caches = true)
+  PrepareStep(PrepareContext& context, RunContext& run, std::vector<double>& seconds, const Image* environment,
+              bool caches = true)
       : context_(context), run_(run), seconds_(seconds), environment_(environment), caches_(caches) {}
 
-  /// Lets a cache look whether it has its wire from an earlier run. `network` stands for the part of the network that leads to it,
-  /// `code` for the sources that do the work; the parameters of its `nodes` count as they are now. Throws Error if another cache
-  /// has the same file.
+  /// Lets a cache look whether it has its wire from an earlier run. `network` stands for the part of the network that leads to
+  /// it, `code` for the sources that do the work; the parameters of its `nodes` count as they are now. Throws Error if another
+  /// cache has the same file.
   template <class Cache>
   void open(Cache& cache, const char* network, const char* code, std::initializer_list<const char*> nodes) {
     if (!caches_) return;
@@ -194,7 +195,8 @@ class NetworkProgram final : public NetworkRun {
       for (int x = tile.x0; x < tile.x1; ++x) {
         if (tile.stopped()) break;
         const std::uint32_t key = hash32(hash32(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y)), seed_hash());
-        for_samples(key, tile.first_sample, tile.first_sample + tile.sample_count, tracer, [&](const SampleStream& random) { render_sample(x, y, random, tracer, film); });
+        for_samples(key, tile.first_sample, tile.first_sample + tile.sample_count, tracer,
+                    [&](const SampleStream& random) { render_sample(x, y, random, tracer, film); });
       }
     }
     tracer.enter(Tracer::kIdle);
@@ -213,8 +215,10 @@ class NetworkProgram final : public NetworkRun {
     const auto measure = [&](const auto& wire) {
       if (i++ != number) return;
       const std::size_t probes = this->probes().size();
-      if (number < probes) this->probes()[number].measure(tile, tracer, seed_hash(), wire, film);
-      else this->lightmaps()[number - probes].measure(tile, tracer, seed_hash(), wire, film);
+      if (number < probes)
+        this->probes()[number].measure(tile, tracer, seed_hash(), wire, film);
+      else
+        this->lightmaps()[number - probes].measure(tile, tracer, seed_hash(), wire, film);
     };
     std::apply([&](const auto&... wire) { (measure(wire), ...); }, network_.measured());
   }

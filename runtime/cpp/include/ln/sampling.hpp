@@ -106,7 +106,8 @@ class SampleStream {
   SampleStream() = default;
   /// `key`: hash of the pixel and the seed. `index`: number of the sample; the first 2^k are well distributed for every k.
   /// `block`: optional; must serve this key and index.
-  SampleStream(std::uint32_t key, std::uint32_t index, SampleBlock* block = nullptr) : key_(key), index_(index), block_(block) {}
+  SampleStream(std::uint32_t key, std::uint32_t index, SampleBlock* block = nullptr)
+      : key_(key), index_(index), block_(block) {}
 
   /// A point of the unit square: dimension `own` of vertex `vertex` of the path.
   LN_INLINE Vec2 get2(std::uint32_t vertex, std::uint32_t own) const {
@@ -126,7 +127,9 @@ class SampleStream {
   float get1(std::uint32_t d, std::uint32_t j, std::uint32_t n) const { return get2(d, j, n).x; }
 
   LN_INLINE float get1(std::uint32_t vertex, std::uint32_t own) const { return get2(vertex, own).x; }
-  LN_INLINE float get1(std::uint32_t vertex, std::uint32_t own, std::uint32_t j, std::uint32_t n) const { return get2(vertex, own, j, n).x; }
+  LN_INLINE float get1(std::uint32_t vertex, std::uint32_t own, std::uint32_t j, std::uint32_t n) const {
+    return get2(vertex, own, j, n).x;
+  }
 
   /// A number that differs from any other of the stream, to be hashed where it is used: coverage decisions.
   std::uint32_t bits(std::uint32_t d) const { return bits(d / kPerVertex, d % kPerVertex); }
@@ -136,7 +139,9 @@ class SampleStream {
 
   /// The stream of branch `j` of the `n` that a path splits into at `vertex`: branches are as well distributed among each other
   /// as samples are.
-  SampleStream branch(std::uint32_t vertex, std::uint32_t j, std::uint32_t n) const { return {hash32(key_, vertex), index_ * n + j}; }
+  SampleStream branch(std::uint32_t vertex, std::uint32_t j, std::uint32_t n) const {
+    return {hash32(key_, vertex), index_ * n + j};
+  }
 
   std::uint32_t index() const { return index_; }
 

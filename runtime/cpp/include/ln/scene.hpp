@@ -44,8 +44,8 @@ inline std::uint32_t tag_mask(TagSet tags, const int* numbers, int count) {
 /// One `tag name = kind "glob" | ...` of a network.
 struct TagRule {
   enum class Kind : std::uint8_t { material, mesh, node, extras };  // extras: `extras.tags` of any of them
-  int tag;           // number of the tag; the rules of one tag stand together
-  const char* name;  // of the tag
+  int tag;                                                          // number of the tag; the rules of one tag stand together
+  const char* name;                                                 // of the tag
   Kind kind;
   const char* glob;
 };
@@ -62,8 +62,8 @@ class Interaction {
   /// The flat surface at `hit`, seen along its normal from the front or the back, with another BSDF: a receiver. Both
   /// `scene` and `bsdf` must outlive it.
   Interaction(const Scene& scene, const Hit& hit, bool front, const Bsdf& bsdf);
-  /// A receiver with a normal of its own: on the surface at `hit`, which blocks what comes from behind it, or, where nothing was
-  /// hit, at `position` in space. Out there it is of no part (kNoPart) and carries no tag.
+  /// A receiver with a normal of its own: on the surface at `hit`, which blocks what comes from behind it, or, where nothing
+  /// was hit, at `position` in space. Out there it is of no part (kNoPart) and carries no tag.
   Interaction(const Scene& scene, const Hit& hit, const Vec3& position, const Vec3& normal, const Bsdf& bsdf);
   Interaction(const Interaction&) = delete;
   Interaction& operator=(const Interaction&) = delete;
@@ -75,26 +75,27 @@ class Interaction {
   bool side_agrees(const Vec3& w, float local_z) const { return (glm::dot(w, at.ng) >= 0) == ((local_z >= 0) == front); }
 
   SurfacePosition at;
-  Frame frame;              // shading frame; its normal is on the side of wo
-  Vec3 wo;                  // towards where the light is wanted, world space
+  Frame frame;  // shading frame; its normal is on the side of wo
+  Vec3 wo;      // towards where the light is wanted, world space
   Vec3 wo_local;
   Hit hit;
-  std::uint32_t part;       // or kNoPart
-  bool front;               // wo is on the front side
-  Color transmittance{1};   // of the ray that led here, where it ran through an absorbing solid
+  std::uint32_t part;      // or kNoPart
+  bool front;              // wo is on the front side
+  Color transmittance{1};  // of the ray that led here, where it ran through an absorbing solid
 
  private:
   friend class Scene;
 
-  const Bsdf* bsdf_;        // the part's own, or own_
+  const Bsdf* bsdf_;  // the part's own, or own_
   union {
-    Bsdf own_;              // where the material varies; trivially destructible
+    Bsdf own_;  // where the material varies; trivially destructible
   };
 };
 
 class Scene {
  public:
-  /// Builds the acceleration structure and everything derived from `data`; `environment`, if any, must outlive it. Throws Error.
+  /// Builds the acceleration structure and everything derived from `data`; `environment`, if any, must outlive it. Throws
+  /// Error.
   Scene(SceneData data, std::span<const TagRule> tags, int threads, const Image* environment);
 
   const SceneData& data() const { return data_; }
@@ -138,8 +139,8 @@ class Scene {
 
   SceneData data_;
   Accel accel_;
-  std::vector<Baked> baked_;                                     // by part
-  std::vector<std::unique_ptr<DielectricTable>> dielectrics_;    // by material; null where not needed
+  std::vector<Baked> baked_;                                   // by part
+  std::vector<std::unique_ptr<DielectricTable>> dielectrics_;  // by material; null where not needed
   std::vector<TagSet> part_tags_, light_tags_;
   const Image* environment_;
   std::unique_ptr<Emitters> emitters_;

@@ -18,8 +18,8 @@ namespace ln {
 
 enum class Wrap : std::uint8_t { repeat, clamp, mirror };
 
-/// Decoded image: `width * height * channels` values, row 0 at the top (v = 0). 8-bit data stays 8-bit; everything else is float,
-/// linear and finite. Alpha is not premultiplied.
+/// Decoded image: `width * height * channels` values, row 0 at the top (v = 0). 8-bit data stays 8-bit; everything else is
+/// float, linear and finite. Alpha is not premultiplied.
 struct Image {
   int width = 0, height = 0, channels = 0;
   bool srgb = false;  // colour channels of 8-bit data are sRGB-encoded (alpha never is)
@@ -106,23 +106,23 @@ struct SceneData {
   double unit = 1;
 
   std::vector<Vec3> positions;
-  std::vector<UVec3> triangles;               // front side: counter-clockwise, also under mirroring transforms
-  std::vector<std::uint32_t> triangle_part;   // index into `parts`; parts come one after another
+  std::vector<UVec3> triangles;              // front side: counter-clockwise, also under mirroring transforms
+  std::vector<std::uint32_t> triangle_part;  // index into `parts`; parts come one after another
   // Vertex attributes, as long as `positions`, or empty where no part has them.
-  std::vector<Vec3> normals;                  // unit length; zero: the part or the vertex has none, use the triangle's own
-  std::vector<Vec4> tangents;                 // w: handedness; zero: none
+  std::vector<Vec3> normals;   // unit length; zero: the part or the vertex has none, use the triangle's own
+  std::vector<Vec4> tangents;  // w: handedness; zero: none
   std::vector<Vec2> uvs[2];
-  std::vector<Vec4> colors;                   // linear; (1, 1, 1, 1) where a part has none
+  std::vector<Vec4> colors;  // linear; (1, 1, 1, 1) where a part has none
 
-  std::uint32_t alpha_begin = 0;              // triangles from here on have partial coverage (set by Scene, which sorts them so)
+  std::uint32_t alpha_begin = 0;  // triangles from here on have partial coverage (set by Scene, which sorts them so)
 
   std::vector<Part> parts;
-  std::vector<Material> materials;            // at least one; glTF's default material is appended where used
-  std::vector<Image> images;                  // only those that some used material refers to
+  std::vector<Material> materials;  // at least one; glTF's default material is appended where used
+  std::vector<Image> images;        // only those that some used material refers to
   std::vector<PunctualLight> lights;
-  std::vector<Camera> cameras;                // in node order of the default scene; may be empty
+  std::vector<Camera> cameras;  // in node order of the default scene; may be empty
 
-  std::vector<std::string> notes;             // to be said on stderr: what was ignored, repaired or dropped
+  std::vector<std::string> notes;  // to be said on stderr: what was ignored, repaired or dropped
 };
 
 }  // namespace ln

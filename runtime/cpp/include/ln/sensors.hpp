@@ -25,9 +25,9 @@ struct SensorFile {
 /// Names of the columns that a probe adds.
 inline constexpr const char* kResultColumns[] = {"E_r", "E_g", "E_b", "lux", "stderr"};
 
-/// Reads comma-separated values x, y, z, nx, ny, nz. Where the first row holds names, the columns may stand in any order and there
-/// may be others, which are kept; columns of earlier results are left out. Empty lines and lines that begin with # are skipped,
-/// normals are brought to unit length. Throws Error "<path>:<line>: ..." for anything else.
+/// Reads comma-separated values x, y, z, nx, ny, nz. Where the first row holds names, the columns may stand in any order and
+/// there may be others, which are kept; columns of earlier results are left out. Empty lines and lines that begin with # are
+/// skipped, normals are brought to unit length. Throws Error "<path>:<line>: ..." for anything else.
 SensorFile read_sensors(const std::string& path);
 
 }  // namespace ln

@@ -10,7 +10,8 @@ namespace ln {
 /// Weight of a photon at distance d of the kernel's radius r: 1, 1 - d/r, or 1 - (d/r)^2.
 enum class PhotonKernel : std::uint8_t { constant, cone, parabola };
 
-/// Integrals over a surface of a kernel times 1, x, y, x^2, xy, y^2. (x, y): direction in the tangent plane times distance [radii].
+/// Integrals over a surface of a kernel times 1, x, y, x^2, xy, y^2. (x, y): direction in the tangent plane times distance
+/// [radii].
 struct SurfaceMoments {
   float one = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
 };
@@ -32,12 +33,12 @@ struct SurfaceBlocker {
 struct SurfaceCoverage {
   static constexpr int kMaxBlockers = 64;
 
-  float radius = 0;  // of the kernel that was measured
-  float area = 0;    // integral of the kernel over the visible surface of the neighbourhood
+  float radius = 0;        // of the kernel that was measured
+  float area = 0;          // integral of the kernel over the visible surface of the neighbourhood
   SurfaceMoments moments;  // the same by powers of the place [radii]; for the parabola only
   int blockers = 0;
   SurfaceBlocker blocker[kMaxBlockers];
-  Vec3 s, t;       // axes of the tangent plane, divided by the radius
+  Vec3 s, t;  // axes of the tangent plane, divided by the radius
 
   /// Is the surface point `p`, at `offset` from the centre, hidden behind a blocker?
   bool hides(const Vec3& offset) const;
@@ -51,7 +52,8 @@ class SurfaceArea {
 
   /// Measures the surface of a neighbourhood within `radius`, of the filter's triangles. Where more than `kMaxTriangles` of the
   /// neighbourhood are that near, the radius is halved until they are not.
-  void measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage, TriangleFilter filter = {}) const;
+  void measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage,
+               TriangleFilter filter = {}) const;
 
   static constexpr int kMaxTriangles = 2048;
 
@@ -62,15 +64,16 @@ class SurfaceArea {
     float low[3][kWidth], high[3][kWidth], normal_low[3][kWidth], normal_high[3][kWidth];
   };
 
-  /// Calls `use(triangle)`, until it returns false, for all that may be of the neighbourhood, or hide parts of it, within `radius`.
+  /// Calls `use(triangle)`, until it returns false, for all that may be of the neighbourhood, or hide parts of it, within
+  /// `radius`.
   template <class Use>
   void for_near(const Neighbourhood& around, float radius, Use&& use) const;
   template <PhotonKernel kernel>
   bool measure_with(const Neighbourhood& around, float radius, TriangleFilter filter, SurfaceCoverage& coverage) const;
 
   const SceneData* data_ = nullptr;
-  std::vector<std::uint32_t> triangles_;     // in order of size class and position
-  std::vector<std::vector<Boxes>> levels_;   // [0]: boxes of kLeaf triangles each; the last has one element
+  std::vector<std::uint32_t> triangles_;    // in order of size class and position
+  std::vector<std::vector<Boxes>> levels_;  // [0]: boxes of kLeaf triangles each; the last has one element
 };
 
 }  // namespace ln

@@ -19,8 +19,8 @@ struct Hit {
 /// Position on a triangle with a bound of its rounding error, enough to spawn rays from.
 struct SurfacePosition {
   Vec3 p{0};
-  float error = 0;     // how far p may lie off its surface, for a ray query too; see position_error
-  Vec3 ng{0, 0, 1};    // geometric normal of the front side, unit length
+  float error = 0;   // how far p may lie off its surface, for a ray query too; see position_error
+  Vec3 ng{0, 0, 1};  // geometric normal of the front side, unit length
 };
 
 /// A ray; `direction` is unit length unless said otherwise.

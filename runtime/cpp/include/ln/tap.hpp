@@ -1,8 +1,8 @@
 #pragma once
 // Wires written to files as they are stored.
 //
-// A representation that a tap can write has a function write_tap(const TapFile&, const REPRESENTATION&), declared beside its type
-// and found by it. It chooses the format by the suffix of the name, one of those that the representation declares.
+// A representation that a tap can write has a function write_tap(const TapFile&, const REPRESENTATION&), declared beside its
+// type and found by it. It chooses the format by the suffix of the name, one of those that the representation declares.
 
 #include <algorithm>
 #include <cctype>
@@ -23,7 +23,8 @@ struct TapFile {
   bool is(std::string_view suffix) const {
     const std::string_view path = info.file;
     const auto same = [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == b; };
-    return path.size() >= suffix.size() && std::equal(suffix.rbegin(), suffix.rend(), path.rbegin(), [&](char b, char a) { return same(a, b); });
+    return path.size() >= suffix.size() &&
+           std::equal(suffix.rbegin(), suffix.rend(), path.rbegin(), [&](char b, char a) { return same(a, b); });
   }
 };
 

@@ -24,8 +24,9 @@ inline const auto kByteToLinear = [] {
 
 /// Texel (x, y) as linear RGBA; what the image does not have is filled up: grey counts for red, green and blue, alpha is 1.
 inline Vec4 texel(const Image& image, int x, int y) {
-  const std::size_t first = (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x)) *
-                            static_cast<std::size_t>(image.channels);
+  const std::size_t first =
+      (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(x)) *
+      static_cast<std::size_t>(image.channels);
   const auto rgba = [&](auto color, auto alpha) -> Vec4 {
     switch (image.channels) {
       case 1: return Vec4(Vec3(color(0)), 1);

@@ -1,11 +1,11 @@
 #pragma once
 // --verify-paths: does every wire carry the light that its declaration says, no more and no less?
 //
-// For each wire, the energy that it brings to surfaces is compared with the energy of particles that are traced from the emitters
-// by plain code and counted as often as the wire's automaton counts their way (reference_paths.hpp). Surfaces are told apart by the
-// tags of the network, and those count that scatter by what the wire's contents can be scattered by: D for irradiance, D and G for
-// samples, all for radiance. Everything, the network's preparation included, is done anew in independent batches, from whose
-// spread the standard errors come.
+// For each wire, the energy that it brings to surfaces is compared with the energy of particles that are traced from the
+// emitters by plain code and counted as often as the wire's automaton counts their way (reference_paths.hpp). Surfaces are told
+// apart by the tags of the network, and those count that scatter by what the wire's contents can be scattered by: D for
+// irradiance, D and G for samples, all for radiance. Everything, the network's preparation included, is done anew in
+// independent batches, from whose spread the standard errors come.
 //
 // How the energy of a representation is measured is an overload of `wire_energy`; a representation without one is listed as not
 // compared. This header is read with every network, so it holds declarations only.
@@ -30,12 +30,12 @@ class PhotonMap;
 /// A wire, as the generated program describes it.
 struct WireInfo {
   NodeId node;
-  PathLanguage paths;             // what the eye sees of it: a path that arrives at a surface goes on by D, then E
-  std::span<const int> counts;    // by state of `paths`: how often a path that ends there is counted
-  std::span<const int> routes;    // the same without regard to signs
-  Events receivers;               // a surface counts if it scatters by one of them
-  float bias;                     // relative bound: the sum of those of all operators on the way
-  const char* reason;             // why its energy cannot be compared; empty: it can
+  PathLanguage paths;           // what the eye sees of it: a path that arrives at a surface goes on by D, then E
+  std::span<const int> counts;  // by state of `paths`: how often a path that ends there is counted
+  std::span<const int> routes;  // the same without regard to signs
+  Events receivers;             // a surface counts if it scatters by one of them
+  float bias;                   // relative bound: the sum of those of all operators on the way
+  const char* reason;           // why its energy cannot be compared; empty: it can
 };
 
 /// Energy that arrives at surfaces.
@@ -62,11 +62,13 @@ WireEnergy wire_energy(const EnergySampler& sampler, const PhotonMap& map);
 template <class Stored>
   requires requires(const Stored& stored) { Color(stored.irradiance(std::uint32_t{}, 0.0f, 0.0f, true)); }
 WireEnergy wire_energy(const EnergySampler& sampler, const Stored& stored) {
-  return wire_energy(sampler, [&](Tracer&, const SampleStream&, const Hit& hit, bool front) { return stored.irradiance(hit.triangle, hit.u, hit.v, front); });
+  return wire_energy(sampler, [&](Tracer&, const SampleStream&, const Hit& hit, bool front) {
+    return stored.irradiance(hit.triangle, hit.u, hit.v, front);
+  });
 }
 
-/// What answers the requests of a Points wire, as an IrradianceSource. `kScene` as in Request. They are of the type by which the eye
-/// asks (see run.hpp), so the compiler has nothing to instantiate anew.
+/// What answers the requests of a Points wire, as an IrradianceSource. `kScene` as in Request. They are of the type by which
+/// the eye asks (see run.hpp), so the compiler has nothing to instantiate anew.
 template <Events kScene, class Pull>
 auto irradiance_of(Pull pull) {
   constexpr Events kWhite = any(kScene & Events::D) ? kScene : Events::all;

@@ -11,7 +11,7 @@ struct SurfaceDE {
   std::int64_t neighbours = 1600;
   std::int64_t fewest = 100;
   float radius = 0;  // [m]; 0: automatic
-  float spacing = 0.5f;
+  float spacing = 0.7f;
 
   void prepare(PrepareContext& context, const SortedPhotons& photons) {
     const auto unit = static_cast<float>(context.scene().data().unit);

@@ -12,6 +12,8 @@ constexpr float kSame = 2, kDifferent = 3.5f;
 
 /// Kernels that an estimate may choose from.
 constexpr int kMaxKernels = 13;
+/// Of them, so many get their photons from one search: most points need several.
+constexpr int kKernelsInASearch = 3;
 
 /// Determinant of the covariance of places under the kernel, below which the surface is too thin for a slope; 1/36 on a full
 /// disc.
@@ -40,46 +42,107 @@ float standard_errors(const LocalEstimate& wider, const LocalEstimate& narrower)
 
 bool nearer(const NearPhoton& a, const NearPhoton& b) { return a.distance2 < b.distance2; }
 
+/// Photons near a point, as sums over them want them.
+class LocalPhotons {
+ public:
+  LocalPhotons(const PhotonMap& map, const Neighbourhood& around)
+      : map_(map), around_(around), frame_(make_frame(around.normal)) {}
+
+  /// In this order, from here on.
+  void assign(std::span<const NearPhoton> photons) {
+    blocks_.assign((photons.size() + kLanes - 1) / kLanes, Block{});
+    for (std::size_t i = 0; i < photons.size(); ++i) {
+      Block& block = blocks_[i / kLanes];
+      const std::size_t lane = i % kLanes;
+      const Vec3 offset = map_.position(photons[i].slot) - around_.point;
+      const Color flux = map_.flux(photons[i].slot);
+      block.distance2[lane] = photons[i].distance2;
+      block.x[lane] = glm::dot(offset, frame_.s);
+      block.y[lane] = glm::dot(offset, frame_.t);
+      block.red[lane] = flux.x;
+      block.green[lane] = flux.y;
+      block.blue[lane] = flux.z;
+    }
+    for (Block& block : blocks_) {
+      const Lanes in_plane2 = block.x * block.x + block.y * block.y;
+      for (std::size_t lane = 0; lane < kLanes; ++lane)
+        block.stretch[lane] = in_plane2[lane] > 0 ? std::sqrt(block.distance2[lane] / in_plane2[lane]) : 0;
+    }
+  }
+
+  /// The estimate from the photons within `radius`, which are among the first `count`, or among all.
+  LocalEstimate estimate(std::size_t count, float radius, const SurfaceArea& area, TriangleFilter filter) const {
+    SurfaceCoverage coverage;
+    area.measure(around_, std::max(radius, kMinRadius), PhotonKernel::parabola, coverage, filter);
+    if (!(coverage.area > 0)) return {.radius = radius};
+    const Vec3 weights = linear_weights(coverage.moments);
+    const float scale = 1 / coverage.radius, inverse_area = sqr(scale);
+    Lanes red{}, green{}, blue{}, variance{};
+    for (std::size_t i = 0; i < std::min((count + kLanes - 1) / kLanes, blocks_.size()); ++i) {
+      const Block& block = blocks_[i];
+      const Lanes x = block.x * scale, y = block.y * scale, kernel = 1 - block.distance2 * inverse_area;
+      const Lanes weight = kernel * (weights.x + (weights.y * x + weights.z * y) * block.stretch);
+      LaneMask counts = kernel > 0;
+      if (coverage.blockers > 0) counts &= ~coverage.hides(x, y);
+      const Lanes used = counts ? weight : Lanes{};
+      red += used * block.red;
+      green += used * block.green;
+      blue += used * block.blue;
+      const Lanes term = used * (block.red + block.green + block.blue) * (1.0f / 3);
+      variance += term * term;
+    }
+    const Color E = Color(sum(red), sum(green), sum(blue)) * inverse_area;
+    return {glm::max(E, Color(0)), std::sqrt(sum(variance)) * inverse_area, radius, coverage.area};
+  }
+
+ private:
+  /// (x, y): place in the tangent plane; times `stretch`, it is as far from the point as the photon is.
+  struct Block {
+    Lanes distance2 = Lanes{} + kInfinity, x{}, y{}, stretch{}, red{}, green{}, blue{};
+  };
+
+  const PhotonMap& map_;
+  const Neighbourhood& around_;
+  const Frame frame_;
+  std::vector<Block> blocks_;
+};
+
 }  // namespace
 
 LocalEstimate local_linear(const PhotonMap& map, std::span<const NearPhoton> photons, const SurfaceArea& area,
                            const Neighbourhood& around, float radius, TriangleFilter filter) {
-  SurfaceCoverage coverage;
-  area.measure(around, std::max(radius, kMinRadius), PhotonKernel::parabola, coverage, filter);
-  if (!(coverage.area > 0)) return {.radius = radius};
-  const Vec3 weights = linear_weights(coverage.moments);
-  const float inverse_area = 1 / sqr(coverage.radius);
-  Color sum(0);
-  float variance = 0;
-  for (const NearPhoton& photon : photons) {
-    const float q = photon.distance2 * inverse_area;
-    if (q >= 1) continue;
-    const Vec3 offset = map.position(photon.slot) - around.point;
-    if (coverage.blockers > 0 && coverage.hides(offset)) continue;
-    const Vec2 in_plane(glm::dot(offset, coverage.s), glm::dot(offset, coverage.t));
-    const float length = glm::length(in_plane);
-    const Vec2 place = length > 0 ? in_plane * (std::sqrt(q) / length) : Vec2(0);
-    const Color term = (1 - q) * (weights.x + weights.y * place.x + weights.z * place.y) * map.flux(photon.slot);
-    sum += term;
-    variance += sqr(mean_component(term));
-  }
-  return {glm::max(sum * inverse_area, Color(0)), std::sqrt(variance) * inverse_area, radius, coverage.area};
+  LocalPhotons local(map, around);
+  local.assign(photons);
+  return local.estimate(photons.size(), radius, area, filter);
 }
 
 LocalEstimate adaptive_local_linear(const PhotonMap& map, const SurfaceArea& area, const Neighbourhood& around,
                                     const KernelRange& range, TriangleFilter filter) {
   NearPhoton found[PhotonMap::capacity(KernelRange::kMost)];
-  const auto estimate = [&](std::size_t count, float radius) {
-    return local_linear(map, {found, count}, area, around, radius, filter);
-  };
+  LocalPhotons photons(map, around);
   LocalEstimate narrower[kMaxKernels], result;
+  std::size_t searched = 0, count = 0;  // photons looked for, and found
   int kernels = 0;
   for (auto wanted = static_cast<std::size_t>(range.least); wanted <= static_cast<std::size_t>(range.most);
        wanted *= 2, ++kernels) {
-    const float widest = kernels == 0 ? range.narrow_radius : range.max_radius;
-    const std::size_t n = map.nearest(around, sqr(widest), wanted, found);
-    if (n < wanted && kernels > 0) break;
-    const LocalEstimate e = n < wanted ? estimate(n, widest) : estimate(n - 1, std::sqrt(found[n - 1].distance2));
+    if (wanted > searched) {
+      // Those of the next kernels in one go, ordered so that each kernel's come first.
+      searched = wanted;
+      for (int next = 1; next < kKernelsInASearch && 2 * searched <= static_cast<std::size_t>(range.most); ++next)
+        searched *= 2;
+      count = map.nearest(around, sqr(range.max_radius), searched, found);
+      std::size_t end = count;
+      for (std::size_t part = searched; part >= wanted; part /= 2) {
+        if (part >= end) continue;
+        std::nth_element(found, found + (part - 1), found + end, nearer);
+        end = part - 1;
+      }
+      photons.assign({found, count});
+    }
+    if (count < wanted && kernels > 0) break;
+    const float reach = count < wanted ? kInfinity : std::sqrt(found[wanted - 1].distance2);
+    const float radius = kernels == 0 ? std::min(reach, range.narrow_radius) : reach;
+    const LocalEstimate e = photons.estimate(wanted, radius, area, filter);
     float difference = 0;
     for (int k = 0; k < kernels; ++k) difference = std::max(difference, standard_errors(e, narrower[k]));
     if (difference >= kDifferent) break;

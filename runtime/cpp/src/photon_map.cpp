@@ -10,27 +10,6 @@ namespace {
 /// Where the missing photons of the last block are: beyond any query, and squared still a float.
 constexpr float kNowhere = 1e15f;
 
-/// A block's worth of values, in one register where the processor has such.
-using Lanes = float __attribute__((vector_size(4 * PhotonMap::kBlock)));
-using LaneMask = std::int32_t __attribute__((vector_size(4 * PhotonMap::kBlock)));
-
-inline Lanes load(const float* values) {
-  Lanes lanes;
-  __builtin_memcpy(&lanes, values, sizeof lanes);
-  return lanes;
-}
-
-/// Bit i: is lane i of the mask set?
-inline unsigned lane_bits(const LaneMask& mask) {
-#if defined(__AVX__)
-  return static_cast<unsigned>(__builtin_ia32_movmskps256(__builtin_bit_cast(Lanes, mask)));
-#else
-  unsigned bits = 0;
-  for (unsigned i = 0; i < PhotonMap::kBlock; ++i) bits |= static_cast<unsigned>(mask[i] & 1) << i;
-  return bits;
-#endif
-}
-
 /// Blocks that a task of the parallel build should have.
 constexpr std::size_t kTaskBlocks = 1024;
 

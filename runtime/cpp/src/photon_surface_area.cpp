@@ -424,19 +424,6 @@ bool SurfaceArea::measure_with(const Neighbourhood& around, float radius, Triang
   return true;
 }
 
-bool SurfaceCoverage::hides(const Vec3& offset) const {
-  const Vec2 p(glm::dot(offset, s), glm::dot(offset, t));
-  for (int i = 0; i < blockers; ++i) {
-    const Vec2 a = blocker[i].a, b = blocker[i].b;
-    const float c = a.x * b.y - a.y * b.x;
-    const float from_a = a.x * p.y - a.y * p.x, to_b = p.x * b.y - p.y * b.x;
-    // Between the rays to both ends, and beyond the line (by more than rounding).
-    const float beyond = (p.x * (b.y - a.y) - p.y * (b.x - a.x)) - c;
-    if (c > 0 ? from_a >= 0 && to_b >= 0 && beyond > 1e-4f * c : from_a <= 0 && to_b <= 0 && beyond < 1e-4f * c) return true;
-  }
-  return false;
-}
-
 void SurfaceArea::measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage,
                           TriangleFilter filter) const {
   const auto fits = [&](float r) {

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "ln/lanes.hpp"
 #include "ln/photon_tracer.hpp"
 #include "ln/scene.hpp"
 
@@ -58,7 +59,7 @@ class PhotonMap {
     return PackedColor(b.flux_low[i], b.flux_high[i]).unpack();
   }
 
-  static constexpr std::uint32_t kBlock = 8;
+  static constexpr std::uint32_t kBlock = kLanes;
 
  private:
   /// Photons that are scanned together.

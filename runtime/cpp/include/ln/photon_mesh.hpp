@@ -9,7 +9,7 @@ namespace ln {
 struct PhotonMeshOptions {
   NodeId node = 0;  // on whose account rays are cast
   SurfaceKernels kernels{};
-  float spacing = 0.5f;  // longest edges [radii of the kernel there]
+  float spacing = 0.7f;  // longest edges [radii of the kernel there]
 };
 
 /// Estimates the density of photons at the vertices of a mesh that is as fine as the kernels are small. Without cracks. A

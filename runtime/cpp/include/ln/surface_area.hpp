@@ -1,6 +1,7 @@
 #pragma once
 // How much surface lies around a point: what a sum over photons must be divided by.
 
+#include <utility>
 #include <vector>
 
 #include "ln/photon_map.hpp"
@@ -40,8 +41,22 @@ struct SurfaceCoverage {
   SurfaceBlocker blocker[kMaxBlockers];
   Vec3 s, t;  // axes of the tangent plane, divided by the radius
 
-  /// Is the surface point `p`, at `offset` from the centre, hidden behind a blocker?
-  bool hides(const Vec3& offset) const;
+  /// Is the point (x, y) of the tangent plane [radii] hidden behind a blocker? Of one point, or of eight.
+  template <class Number>
+  auto hides(const Number& x, const Number& y) const {
+    decltype(x < y) hidden{};
+    for (int i = 0; i < blockers; ++i) {
+      Vec2 a = blocker[i].a, b = blocker[i].b;
+      if (a.x * b.y < a.y * b.x) std::swap(a, b);
+      const float c = a.x * b.y - a.y * b.x;
+      // Between the rays to both ends, and beyond the line (by more than rounding).
+      hidden |= (a.x * y >= a.y * x) & (x * b.y >= y * b.x) & (x * (b.y - a.y) - y * (b.x - a.x) > c + 1e-4f * c);
+    }
+    return hidden;
+  }
+
+  /// The same of a surface point at `offset` from the centre.
+  bool hides(const Vec3& offset) const { return hides(glm::dot(offset, s), glm::dot(offset, t)); }
 };
 
 /// The triangles of a scene, sorted in space.

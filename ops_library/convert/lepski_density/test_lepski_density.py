@@ -11,10 +11,10 @@ SCENES = Path(__file__).resolve().parents[3] / "examples" / "scenes"
 exr = pytest.importorskip("benchmarks.exr")
 
 NETWORK = """
-network {operator}
+network lepski
 light   = Lights()
-photons = ParticleTracer(light, count = {count})
-density = {operator}(photons)
+photons = ParticleTracer(light, count = 200k)
+density = LepskiDensity(photons)
 expect  <= L (D|G|S)* E
 image   density
 """
@@ -26,39 +26,33 @@ def test_known_answers(runtime_tool):
 
 
 @pytest.fixture(scope="module")
-def picture(compiled_network, tmp_path_factory):
-    """picture("NNDensity", "200k", ...): of the closed box."""
-    folder = tmp_path_factory.mktemp("lepski")
-
-    def render(operator, count, *options):
-        program = compiled_network(operator, text=NETWORK.format(operator=operator, count=count))
-        out = folder / "out.exr"
-        command = [program, SCENES / "closed_box.gltf", "-o", out, "--size", "40x30", "--progress", "none", *options]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-        return exr.read(out)
-
-    return render
+def lepski(compiled_network):
+    return compiled_network("lepski", text=NETWORK)
 
 
-def test_less_error_than_of_the_nearest_neighbours(picture, compiled_network, run_program):
-    """With the same photons at default settings: less than half of the relMSE, and the right mean."""
-    run = run_program(
-        compiled_network("path_tracing"), SCENES / "closed_box.gltf", "--size", "40x30", "--samples", "512"
-    )
+def picture(run_program, program, *options):
+    """Of the closed box."""
+    run = run_program(program, SCENES / "closed_box.gltf", "--size", "40x30", *options)
     assert run.status == 0, run.stderr
-    truth = exr.read(run.picture)
+    return exr.read(run.picture)
+
+
+def test_less_error_than_of_the_nearest_neighbours(lepski, compiled_network, run_program):
+    """With the same photons, and both operators at their default settings: less than half of the error, and the right mean."""
+    truth = picture(run_program, compiled_network("path_tracing"), "--samples", "512")
+    nearest = ("--set", "photons.count=200k", "--set", "density.neighbours=60")
     errors = {}
-    for operator in ("NNDensity", "LepskiDensity"):
-        found = picture(operator, "200k", "--samples", "4")
+    for program, options in ((compiled_network("photon_density"), nearest), (lepski, ())):
+        found = picture(run_program, program, "--samples", "4", *options)
         assert found.mean() == pytest.approx(truth.mean(), rel=0.015)
         ratio = found.mean(axis=2) / truth.mean(axis=2)
-        errors[operator] = np.median((ratio - 1) ** 2)  # without pixels at the lamp's edge
-    assert errors["LepskiDensity"] < 0.5 * errors["NNDensity"]
+        errors[program] = np.median((ratio - 1) ** 2)  # without pixels at the lamp's edge
+    assert errors[lepski] < 0.5 * errors[compiled_network("photon_density")]
 
 
-def test_the_seed_decides_not_the_threads(picture):
-    pictures = [picture("LepskiDensity", "20k", "--samples", "1", "--threads", str(n)) for n in (1, 2, 5)]
+def test_the_seed_decides_not_the_threads(lepski, run_program):
+    options = ("--set", "photons.count=20k", "--samples", "1")
+    pictures = [picture(run_program, lepski, *options, "--threads", str(n)) for n in (1, 2, 5)]
     assert (pictures[0] == pictures[1]).all()
     assert (pictures[0] == pictures[2]).all()
-    assert (pictures[0] != picture("LepskiDensity", "20k", "--samples", "1", "--seed", "1")).any()
+    assert (pictures[0] != picture(run_program, lepski, *options, "--seed", "1")).any()

@@ -132,7 +132,7 @@ TEST_CASE("a plane under a directional light is evenly lit up to its border, in 
     SceneBuilder b;
     add_floor(b, pieces);
     b.directional({0.3f, -1, 0.2f}, Color(3));
-    const Meshed m(b.data, 400'000);
+    const Meshed m(b.data, 150'000);
     const double truth = 3 / std::sqrt(1 + 0.09 + 0.04);
     CHECK(m.mean([](Vec2 u) { return Vec2(1.4f * u.x - 0.7f, 1.4f * u.y - 0.7f); }) == doctest::Approx(truth).epsilon(0.01));
     CHECK(m.mean([](Vec2 u) { return Vec2(0.699f - 0.01f * u.x, 1.398f * u.y - 0.699f); }) ==
@@ -145,8 +145,8 @@ TEST_CASE("a plane under a directional light is evenly lit up to its border, in 
 TEST_CASE("the mesh has the energy of the photons") {
   SceneBuilder b;
   b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), b.material(Color(0.5f), Color(1)));
-  b.sphere(Vec3(0.1f, 0, 0), 0.2f, b.material(Color(0.7f)), false, 30);
-  const Meshed m(b.data, 200'000);
+  b.sphere(Vec3(0.1f, 0, 0), 0.2f, b.material(Color(0.7f)), false, 20);
+  const Meshed m(b.data, 60'000);
   const double truth = total_flux(m.photons).x;
   CHECK(flux(m.mesh) == doctest::Approx(truth).epsilon(0.005));
 }
@@ -156,7 +156,7 @@ TEST_CASE("things that stand on a floor leave no dark rim") {
   add_floor(b);
   b.box({-0.2f, 0.01f, -0.2f}, {0.2f, 0.3f, 0.2f}, b.material(Color(0.5f)), false);
   b.directional({0, -1, 0}, Color(1));
-  const Meshed m(b.data, 300'000, path_automaton<EmptyPath>());
+  const Meshed m(b.data, 150'000, path_automaton<EmptyPath>());
   CHECK(m.mean([](Vec2 u) { return Vec2(0.202f + 0.01f * u.x, 0.3f * u.y - 0.15f); }) == doctest::Approx(1).epsilon(0.04));
   CHECK(m.mean([](Vec2 u) { return Vec2(0.4f + 0.2f * u.x, u.y - 0.5f); }) == doctest::Approx(1).epsilon(0.02));
 }
@@ -174,7 +174,7 @@ TEST_CASE("a surface that few photons hit has their flux over its area") {
 TEST_CASE("a curved surface of many triangles has no cracks and no facets") {
   SceneBuilder b;
   b.sphere(Vec3(0), 0.8f, b.material(Color(0.5f), Color(1)), true, 24);
-  const Meshed m(b.data, 200'000);
+  const Meshed m(b.data, 60'000);
   const double mean = mean_over_square([&](Vec2 u) {
     const double E = m.at(m.mesh, Vec3(0), direction_at(u));
     CHECK(E > 3.5);

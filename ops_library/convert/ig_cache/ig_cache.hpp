@@ -43,7 +43,8 @@ struct IGCache {
     if (read(seen_, IrradianceRecords::kOverlap) > IrradianceRecords::kEnough) return;
     const std::uint32_t key = hash32(request.random().bits(request.depth(), kRoulette));
     const Receiver where{at.hit, at.front, at.at.p, at.frame.n};
-    request.visit(IrradianceRecord{where.p, where.n, 0, 0, sample(request.tracer(), where, key, kSpotShare, samples)}, 1);
+    request.visit(
+        IrradianceRecord{.p = where.p, .n = where.n, .sample = sample(request.tracer(), where, key, kSpotShare, samples)}, 1);
   }
 
   /// The records, for taps.
@@ -100,7 +101,8 @@ struct IGCache {
     const std::vector<Receiver> seen = seen_receivers(
         context, node, [&](int x, int y) { return x % stride == 0 && y % stride == 0; }, [](const Receiver&) { return true; });
     std::vector<Receiver> places;
-    for (std::vector<Receiver> origins : {seen, measured_receivers(context, kProbes), spread_receivers(context, kSpread)}) {
+    for (std::vector<Receiver> origins :
+         {seen, measured_receivers(context, node, kProbes), spread_receivers(context, kSpread)}) {
       for (int generation = 0; generation < kGenerations && !origins.empty(); ++generation) {
         origins = cover(context, beyond_, asked_from(context, origins, samples), key_,
                         [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
@@ -130,10 +132,10 @@ struct IGCache {
       std::vector<Receiver> wanted = seen_receivers(
           context, node,
           [&](int x, int y) { return on_grid(x, y, stride) && (stride == kWidestStride || !on_grid(x, y, 2 * stride)); },
-          [&](const Receiver& r) { return !seen_.covers(r.p, r.n); });
+          [&](const Receiver& r) { return !seen_.covers(r); });
       cover(context, seen_, wanted, key_ + 1, exactly);
     }
-    cover(context, seen_, measured_receivers(context, std::numeric_limits<std::size_t>::max()), key_ + 1, exactly);
+    cover(context, seen_, measured_receivers(context, node, std::numeric_limits<std::size_t>::max()), key_ + 1, exactly);
   }
 
  public:

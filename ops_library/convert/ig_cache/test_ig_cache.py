@@ -1,6 +1,7 @@
 """IGCache: its octree and its series of bounces (in C++); the same bits with any number of threads; what it costs."""
 
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,9 @@ import pytest
 from benchmarks import exr
 
 SCENES = Path(__file__).resolve().parents[3] / "examples" / "scenes"
+sys.path.insert(0, str(SCENES))
+import make_scenes  # noqa: E402
+
 MEASURED = """
 network measured
 light  = Lights()
@@ -86,3 +90,35 @@ def test_records_where_probes_measure(compiled_network, run_program, tmp_path):
     assert np.abs(lux[:-1] / truth[:-1] - 1).mean() < 0.04
     assert truth[-1] == 0
     assert lux[-1] < 0.06 * truth.max()
+
+
+def room_with_closet(path: Path) -> Path:
+    """A room of 4 x 3 x 3 m, its lamp 2 cm below the ceiling. A partition without thickness at x = 1.2 divides off a closet
+    that no light can get into."""
+    scene = make_scenes.GltfWriter("closet")
+    white = scene.add_lambert("White", (0.7, 0.7, 0.7))
+    make_scenes.add_room(scene, (-2.0, 0.0, -1.5), (2.0, 3.0, 1.5), dict.fromkeys(make_scenes.WALL_NAMES, white))
+    sheet = scene.add_material("Sheet", (0.7, 0.7, 0.7), specular=0.0, double_sided=True)
+    scene.add_object("Partition", make_scenes.quad((1.2, 0.0, -1.5), (0.0, 3.0, 0.0), (0.0, 0.0, 3.0)), sheet)
+    lamp = scene.add_emitter("Lamp", (9.0, 9.0, 9.0))
+    scene.add_object("Lamp", make_scenes.ceiling_light((-0.5, 2.98, 0.0), 1.0, 0.6), lamp)
+    scene.write(path)
+    return path
+
+
+def test_neither_light_nor_shadow_leaks(compiled_network, run_program, tmp_path):
+    """Sensors on the floor, from the middle of the room to the closet's far wall; then on the ceiling above the lamp, and on
+    the lamp: black in the closet and above the lamp, elsewhere as bright as by path tracing."""
+    xs = np.linspace(-1.0, 1.96, 38)  # those next to the partition: 4 cm before and behind it
+    rows = [f"{x:.4f},0,{z},0,1,0" for z in (-0.9, 0.3) for x in xs]
+    rows += [f"{x:.4f},{y},{z},0,-1,0" for y in (3, 2.98) for z in (-0.1, 0.1) for x in np.linspace(-0.8, -0.2, 13)]
+    (tmp_path / "sensors.csv").write_text("x,y,z,nx,ny,nz\n" + "\n".join(rows) + "\n")
+    scene = room_with_closet(tmp_path / "closet.glb")
+    done = run_program(compiled_network("measured", text=MEASURED), scene, "--samples", "1024")
+    assert done.status == 0, done.stderr
+    smooth, traced = (np.genfromtxt(tmp_path / f"{n}.csv", delimiter=",", names=True) for n in ("smooth", "traced"))
+    truth, brightest = traced["lux"], traced["lux"].max()
+    lit = truth > 0.01 * brightest
+    assert lit.sum() == 2 * (xs < 1.2).sum() + 26
+    assert smooth["lux"][~lit].max() < 0.01 * brightest
+    assert (np.abs(smooth["lux"] - truth)[lit] < 4 * traced["stderr"][lit] + 0.03 * brightest).all()

@@ -79,6 +79,8 @@ IrradianceSample integrate(const HemisphereGrid& grid, std::span<const Hemispher
   const auto count = static_cast<float>(cells.size());
   result.irradiance = sum * (kPi / count);
   result.distance = inverse_distance > 0 ? count / inverse_distance : kInfinity;
+  const float sin = std::sqrt(1 - 0.5f / static_cast<float>(rings));  // in the middle of the lowest ring
+  for (const HemisphereCell& low : cells.last(sectors)) result.horizon.push_back(1 / (sin * std::max(low.distance, 1e-6f)));
   return result;
 }
 

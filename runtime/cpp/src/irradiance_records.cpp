@@ -46,13 +46,20 @@ Receiver receiver_on(const Scene& scene, const Hit& hit, bool front, float footp
   return {hit, front, at.at.p, at.frame.n, footprint};
 }
 
+/// Distance of what is straight above the surface.
+float distance_above(Tracer& tracer, NodeId node, const Interaction& at) {
+  const Vec3 up = at.front ? at.at.ng : -at.at.ng;
+  return tracer.intersect(spawn_ray(at.at, up), 0, node, RayKind::gather).t;
+}
+
 /// Random numbers of record `index`.
 std::uint32_t record_key(std::uint32_t key, std::size_t index) { return hash32(key, static_cast<std::uint32_t>(index)); }
 
 }  // namespace
 
 void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sample) {
-  IrradianceRecord record{where.p, where.n, 0, 0, sample};
+  IrradianceRecord record{where.p, where.n, 0, 0, kInfinity, where.above, sample};
+  for (const float inverse : sample.horizon) record.clear = std::min(record.clear, 1 / inverse);
 
   // Where irradiance changes fast, the record reaches less far.
   const Color E = sample.irradiance;
@@ -60,20 +67,19 @@ void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sampl
   float distance = std::min(sample.distance, slope > 0 ? sum / slope : kInfinity);
   // No record reaches past the edge of what it sees: there may be a gap behind.
   distance = std::min(distance, sample.nearest / spacing_.error);
-  for_near(record.p, [&](const IrradianceRecord& near) {
+  for_near(record.p, record.n, kFar, [&](const IrradianceRecord& near) {
     if (glm::dot(near.n, record.n) > 0.5f)
       distance = std::min(distance, near.sample.distance + glm::distance(near.p, record.p));
     return false;
   });
   const float low = spacing_.closest * where.footprint, high = spacing_.farthest * where.footprint;
-  constexpr float kLeast = 1.0f / 40;  // of the least reach: bounds the number of records in gaps
-  record.exact = std::max(kLeast * low, std::min(spacing_.error * distance, high));
+  record.exact = std::clamp(std::min(spacing_.error * distance, high), least_exact(where), reach_below(where));
   record.reach = std::max(record.exact, low);
   record.sample.distance = record.reach / spacing_.error;
   limit_gradients(record.sample);
 
   const auto index = static_cast<std::uint32_t>(records_.size());
-  for_near(record.p, [&](const IrradianceRecord& near) {
+  for_near(record.p, record.n, kFar, [&](const IrradianceRecord& near) {
     if (glm::dot(near.n, record.n) <= 0.5f) return false;
     IrradianceRecord& other = records_[static_cast<std::size_t>(&near - records_.data())];
     const float limit = record.sample.distance + glm::distance(near.p, record.p);
@@ -103,11 +109,26 @@ Color IrradianceRecords::mean_irradiance() const {
   return records_.empty() ? Color(0) : Color(sum / static_cast<double>(records_.size()));
 }
 
-bool IrradianceRecords::covers(const Vec3& p, const Vec3& n) const {
+bool IrradianceRecords::beyond_horizon(const IrradianceRecord& record, const Vec3& p) {
+  const Frame frame = make_frame(record.n);
+  const Vec3 d = p - record.p;
+  const float x = glm::dot(d, frame.s), y = glm::dot(d, frame.t);
+  // Interpolated linearly, which fits walls: their inverse distance goes with the cosine.
+  const std::vector<float>& horizon = record.sample.horizon;
+  const auto sectors = static_cast<float>(horizon.size());
+  float at = std::atan2(y, x) * (sectors / (2 * kPi)) - 0.5f;
+  if (at < 0) at += sectors;
+  const std::size_t first = std::min(static_cast<std::size_t>(at), horizon.size() - 1), second = (first + 1) % horizon.size();
+  return std::sqrt(x * x + y * y) * glm::mix(horizon[first], horizon[second], at - static_cast<float>(first)) > 1;
+}
+
+bool IrradianceRecords::covers(const Receiver& where) const {
+  const float known = reach_below(where);
   float sum = 0;
-  for_near(p, [&](const IrradianceRecord& record) {
-    const float e = error(record, p, n);
-    if (e < 1) sum += cover_by(record, p, e, kOverlap);
+  for_near(where.p, where.n, 1, [&](const IrradianceRecord& record) {
+    const float e = error(record, where.p, where.n);
+    const bool knows = record.exact <= known + spacing_.error * glm::distance(where.p, record.p);
+    if (e < 1 && knows && !hidden(record, where.p)) sum += cover_by(record, where.p, e, kOverlap);
     return sum > kEnough;
   });
   return sum > kEnough;
@@ -116,17 +137,17 @@ bool IrradianceRecords::covers(const Vec3& p, const Vec3& n) const {
 /// A record is in all cells that it may reach of the level whose cells are just as wide as that.
 void IrradianceRecords::insert(std::uint32_t record, std::int32_t node, const Vec3& centre, float half) {
   constexpr float kSmallest = 0x1p-20f;
-  const float reach = kFar * records_[record].reach;
+  const IrradianceRecord& added = records_[record];
+  const float reach = kFar * added.reach;
   if (half < 2 * reach || half < kSmallest) {
-    entries_.push_back({record, nodes_[node].entry});
-    nodes_[node].entry = static_cast<std::int32_t>(entries_.size() - 1);
+    nodes_[node].entries.push_back({added.p, added.reach, added.n, record});
     return;
   }
   const float quarter = 0.5f * half;
   for (int octant = 0; octant < 8; ++octant) {
     const Vec3 middle =
         centre + Vec3(octant & 1 ? quarter : -quarter, octant & 2 ? quarter : -quarter, octant & 4 ? quarter : -quarter);
-    const Vec3 off = glm::max(glm::abs(records_[record].p - middle) - quarter, Vec3(0));
+    const Vec3 off = glm::max(glm::abs(added.p - middle) - quarter, Vec3(0));
     if (glm::dot(off, off) > sqr(reach)) continue;
     if (nodes_[node].children[octant] < 0) {
       nodes_[node].children[octant] = static_cast<std::int32_t>(nodes_.size());
@@ -149,7 +170,7 @@ std::vector<Receiver> cover(PrepareContext& context, IrradianceRecords& records,
   while (true) {
     covered.assign(left.size(), 0);
     context.for_chunks(left.size(), 256, [&](std::size_t begin, std::size_t end, Tracer&) {
-      for (std::size_t i = begin; i < end; ++i) covered[i] = records.covers(wanted[left[i]].p, wanted[left[i]].n);
+      for (std::size_t i = begin; i < end; ++i) covered[i] = records.covers(wanted[left[i]]);
     });
     std::size_t kept = 0;
     for (std::size_t i = 0; i < left.size(); ++i)
@@ -224,7 +245,8 @@ std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, Funct
       const Interaction at(context.scene(), ray, hit);
       distance += hit.t;
       if (any(at.bsdf().events() & Events::D)) {
-        const Receiver receiver{hit, at.front, at.at.p, at.frame.n, view.rays.height_at(distance)};
+        const Receiver receiver{
+            hit, at.front, at.at.p, at.frame.n, view.rays.height_at(distance), distance_above(tracer, node, at)};
         if (keep(receiver)) found.push_back(receiver);
       }
       Request<Events::S> request(tracer, random, at, Color(1), depth + 1, RayKind::camera);
@@ -243,12 +265,18 @@ std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, Funct
   return all;
 }
 
-std::vector<Receiver> measured_receivers(PrepareContext& context, std::size_t most) {
+std::vector<Receiver> measured_receivers(PrepareContext& context, NodeId node, std::size_t most) {
   const float size = scene_size(context.scene().data());
   const std::vector<MeasuredPlace> places = context.view().measured();
-  std::vector<Receiver> found;
-  for (std::size_t i = 0; i < places.size(); i += 1 + places.size() / most)
-    found.push_back(receiver_on(context.scene(), places[i].hit, places[i].front, size));
+  const std::size_t step = 1 + places.size() / most;
+  std::vector<Receiver> found((places.size() + step - 1) / step);
+  context.for_chunks(found.size(), 256, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const MeasuredPlace& place = places[i * step];
+      const Interaction at(context.scene(), place.hit, place.front, white_receiver());
+      found[i] = {place.hit, place.front, at.at.p, at.frame.n, size, distance_above(tracer, node, at)};
+    }
+  });
   return found;
 }
 

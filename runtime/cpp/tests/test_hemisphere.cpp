@@ -125,3 +125,16 @@ TEST_CASE("nothing but sky: infinitely far, and the same wherever one goes") {
   CHECK(glm::length(sample.translation[0]) == 0);
   CHECK(glm::length(sample.rotation[0]) > 0.1f);
 }
+
+TEST_CASE("the horizon of a cube: inverse distances to its walls along the surface") {
+  const HemisphereGrid grid = HemisphereGrid::of(500);
+  const Frame frame = make_frame(Vec3(0, 0, 1));
+  const Vec3 p(0.2f, -0.3f, -0.9f);
+  const IrradianceSample sample = integrate(grid, look(bright_cube, grid, p, frame), frame);
+  REQUIRE(sample.horizon.size() == static_cast<std::size_t>(grid.azimuth));
+  for (int k = 0; k < grid.azimuth; ++k) {
+    const float phi = 2 * kPi * (static_cast<float>(k) + 0.5f) / static_cast<float>(grid.azimuth);
+    const Vec3 along = frame.s * std::cos(phi) + frame.t * std::sin(phi);
+    CHECK(1 / sample.horizon[static_cast<std::size_t>(k)] == doctest::Approx(bright_cube(p, along).distance));
+  }
+}

@@ -2,6 +2,7 @@
 // Irradiance and its gradients from a stratified hemisphere (Ward and Heckbert 1992, "Irradiance Gradients").
 
 #include <span>
+#include <vector>
 
 #include "ln/math.hpp"
 
@@ -32,6 +33,7 @@ struct IrradianceSample {
   glm::mat3 translation{0.0f};  // [W/m^2 a unit]: a point `d` away gets d * translation more
   float distance = kInfinity;   // harmonic mean of the distances of what is seen
   float nearest = kInfinity;    // the least of them
+  std::vector<float> horizon;   // inverse distance along the surface of what the lowest ring saw, sector by sector
 };
 
 /// The irradiance of a surface with the local frame `frame`; `cells` ring by ring.

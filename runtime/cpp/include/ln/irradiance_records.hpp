@@ -16,14 +16,17 @@ struct TapFile;
 struct Receiver {
   Hit hit;
   bool front = true;
-  Vec3 p{0}, n{0, 0, 1};  // n: shading normal on that side
-  float footprint = 0;    // height of the picture as it appears there [normalised units]
+  Vec3 p{0}, n{0, 0, 1};    // n: shading normal on that side
+  float footprint = 0;      // height of the picture as it appears there [normalised units]
+  float above = kInfinity;  // distance of what is straight above, as far as that is known
 };
 
 struct IrradianceRecord {
   Vec3 p{0}, n{0, 0, 1};
-  float exact = 0;  // distance at which the error of using the record has grown to what is allowed
-  float reach = 0;  // the same, kept within bounds: how far the record is used at all
+  float exact = 0;          // distance at which the error of using the record has grown to what is allowed
+  float reach = 0;          // the same, kept within bounds: how far the record is used at all
+  float clear = kInfinity;  // up to there nothing that it saw stands in the way, to whichever side
+  float above = kInfinity;  // as of Receiver
   IrradianceSample sample;
 
   /// Irradiance at a point near the record, extrapolated by its gradients.
@@ -56,8 +59,8 @@ class IrradianceRecords {
 
   Color mean_irradiance() const;
 
-  /// Do the records whose error at the point is allowed weigh enough?
-  bool covers(const Vec3& p, const Vec3& n) const;
+  /// Do the records whose error there is allowed weigh enough? None counts that is too far away to know of what is above.
+  bool covers(const Receiver& where) const;
 
   /// Calls `visit(record, weight)` for records near the point. Weights fall to 0 with the error, like Tabellion and
   /// Lamorlette's (2004), but with its third power: where irradiance is curved, gradients lead astray with the square of the
@@ -67,9 +70,9 @@ class IrradianceRecords {
   template <class Visit>
   float visit(const Vec3& p, const Vec3& n, float limit, Visit&& visit) const {
     float sum = 0;
-    for_near(p, [&](const IrradianceRecord& record) {
+    for_near(p, n, limit, [&](const IrradianceRecord& record) {
       const float e = error(record, p, n);
-      if (e >= limit) return false;
+      if (e >= limit || hidden(record, p)) return false;
       const float trust = cover_by(record, p, e, limit);
       visit(record, sqr(1 - e / limit) * trust);
       sum += trust;
@@ -84,37 +87,53 @@ class IrradianceRecords {
       0.1f;  // cover: one record suffices, unless it is far out of its depth, as those in narrow gaps are
 
  private:
+  /// What shows of most records that they are of no use somewhere; `reach` may have shrunk since.
+  struct Entry {
+    Vec3 p;
+    float reach;
+    Vec3 n;
+    std::uint32_t record;
+  };
   struct Node {
     std::int32_t children[8] = {-1, -1, -1, -1, -1, -1, -1, -1};
-    std::int32_t entry = -1;
-  };
-  struct Entry {
-    std::uint32_t record;
-    std::int32_t next;
+    std::vector<Entry> entries;
   };
 
   /// Error of using a record at a point, in units of what is allowed (Ward et al. 1988, eq. 4). Distance from the tangent
-  /// plane counts four times: what lies on another level (steps, table and floor) has other surroundings.
+  /// plane counts four times: what lies on another level (steps, table and floor) has other surroundings. No record serves
+  /// what lies behind it (their "in front" test), nor what lies beyond the thing above it.
   float error(const IrradianceRecord& record, const Vec3& p, const Vec3& n) const {
+    constexpr float kBehind = 0.02f;  // as a share of the distance: surfaces may be a little curved
     const Vec3 d = p - record.p;
-    const float off = 4 * glm::dot(d, record.n + n) * 0.5f;
+    const float distance = glm::length(d), height = 0.5f * glm::dot(d, record.n + n);
+    if (height < -kBehind * distance || height > 0.5f * record.above) return kInfinity;
     const float turned = safe_sqrt(1 - glm::dot(n, record.n));
-    return std::sqrt(glm::dot(d, d) + off * off) / record.reach + turned / spacing_.error;
+    return std::sqrt(sqr(distance) + sqr(4 * height)) / record.reach + turned / spacing_.error;
   }
+
+  /// Did the record see something that stands between it and the point?
+  static bool hidden(const IrradianceRecord& record, const Vec3& p) {
+    return glm::distance(p, record.p) > record.clear && beyond_horizon(record, p);
+  }
+  static bool beyond_horizon(const IrradianceRecord& record, const Vec3& p);
 
   static float cover_by(const IrradianceRecord& record, const Vec3& p, float e, float limit) {
     return (1 - e / limit) * record.exact / std::max(record.exact, glm::distance(p, record.p));
   }
 
-  /// Calls `use(record)` for all records that may reach `p`, until it says true.
+  /// Calls `use(record)` for all records whose error may be below `limit`, until it says true.
   template <class Use>
-  void for_near(const Vec3& p, Use&& use) const {
+  void for_near(const Vec3& p, const Vec3& n, float limit, Use&& use) const {
     if (nodes_.empty()) return;
+    const float least_cos = 1 - sqr(limit * spacing_.error);
     Vec3 centre(0);
     float half = 1;
     for (std::int32_t node = 0; node >= 0;) {
-      for (std::int32_t e = nodes_[node].entry; e >= 0; e = entries_[e].next)
-        if (use(records_[entries_[e].record])) return;
+      for (const Entry& entry : nodes_[node].entries) {
+        const Vec3 d = p - entry.p;
+        if (glm::dot(d, d) >= sqr(limit * entry.reach) || glm::dot(n, entry.n) <= least_cos) continue;
+        if (use(records_[entry.record])) return;
+      }
       const int octant = (p.x > centre.x) | (p.y > centre.y) << 1 | (p.z > centre.z) << 2;
       half *= 0.5f;
       centre += Vec3(octant & 1 ? half : -half, octant & 2 ? half : -half, octant & 4 ? half : -half);
@@ -122,12 +141,21 @@ class IrradianceRecords {
     }
   }
 
+  /// What is straight above a record bounds its reach, as if all that is above were not much farther away.
+  float reach_below(const Receiver& where) const {
+    constexpr float kWide = 2;  // harmonic mean distance of a wide ceiling in units of its height, 1.5, and some more
+    return std::max(spacing_.error * kWide * where.above, least_exact(where));
+  }
+  float least_exact(const Receiver& where) const {
+    constexpr float kLeast = 1.0f / 40;  // of the least reach: bounds the number of records in gaps
+    return kLeast * spacing_.closest * where.footprint;
+  }
+
   void insert(std::uint32_t record, std::int32_t node, const Vec3& centre, float half);
 
   RecordSpacing spacing_;
   std::vector<IrradianceRecord> records_;
   std::vector<Node> nodes_;
-  std::vector<Entry> entries_;
 };
 
 /// The records of a wire: where the eye sees surfaces, and coarser ones where it does not but the records get their light from.
@@ -173,7 +201,7 @@ std::vector<Receiver> seen_receivers(PrepareContext& context, NodeId node, Funct
 
 /// The places on surfaces where probes and lightmaps measure, evenly thinned out where they are more than `most`. There is no
 /// picture there: the whole scene counts as one.
-std::vector<Receiver> measured_receivers(PrepareContext& context, std::size_t most);
+std::vector<Receiver> measured_receivers(PrepareContext& context, NodeId node, std::size_t most);
 
 /// About `count` places spread evenly over all surfaces that scatter diffusely, for what nobody has announced.
 std::vector<Receiver> spread_receivers(PrepareContext& context, std::uint32_t count);

@@ -93,8 +93,8 @@ def test_records_where_probes_measure(compiled_network, run_program, tmp_path):
 
 
 def room_with_closet(path: Path) -> Path:
-    """A room of 4 x 3 x 3 m, its lamp 2 cm below the ceiling. A partition without thickness at x = 1.2 divides off a closet
-    that no light can get into."""
+    """A room of 4 x 3 x 3 m, its lamp 2 cm below the ceiling. A partition without thickness at x = 1.2 divides off a
+    closet that no light can get into."""
     scene = make_scenes.GltfWriter("closet")
     white = scene.add_lambert("White", (0.7, 0.7, 0.7))
     make_scenes.add_room(scene, (-2.0, 0.0, -1.5), (2.0, 3.0, 1.5), dict.fromkeys(make_scenes.WALL_NAMES, white))
@@ -107,8 +107,8 @@ def room_with_closet(path: Path) -> Path:
 
 
 def test_neither_light_nor_shadow_leaks(compiled_network, run_program, tmp_path):
-    """Sensors on the floor, from the middle of the room to the closet's far wall; then on the ceiling above the lamp, and on
-    the lamp: black in the closet and above the lamp, elsewhere as bright as by path tracing."""
+    """Sensors on the floor, from the middle of the room to the closet's far wall; then on the ceiling above the lamp,
+    and on the lamp: black in the closet and above the lamp, elsewhere as bright as by path tracing."""
     xs = np.linspace(-1.0, 1.96, 38)  # those next to the partition: 4 cm before and behind it
     rows = [f"{x:.4f},0,{z},0,1,0" for z in (-0.9, 0.3) for x in xs]
     rows += [f"{x:.4f},{y},{z},0,-1,0" for y in (3, 2.98) for z in (-0.1, 0.1) for x in np.linspace(-0.8, -0.2, 13)]

@@ -38,7 +38,7 @@ def picture(run_program, program, *options):
 
 
 def test_less_error_than_of_the_nearest_neighbours(lepski, compiled_network, run_program):
-    """With the same photons, and both operators at their default settings: less than half of the error, and the right mean."""
+    """With the same photons, and both operators at default settings: less than half the error, and the right mean."""
     truth = picture(run_program, compiled_network("path_tracing"), "--samples", "512")
     nearest = ("--set", "photons.count=200k", "--set", "density.neighbours=60")
     errors = {}

@@ -11,7 +11,7 @@ namespace ln::ops {
 /// Hierarchical radiosity; see radiosity.ln.
 struct Radiosity {
   NodeId node;
-  float error = 0.01f;
+  float error = 0.03f;
   float smallest = 0;  // [m]; 0: automatic
   float residual = 1e-3f;
   std::int64_t iterations = 200;

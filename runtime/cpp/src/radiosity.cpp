@@ -38,10 +38,44 @@ constexpr float kDarkest = 1;
 constexpr float kSourceWeight = 4;
 /// Cells that are nearer to each other, in sums of their radii, look at each other by solid angle.
 constexpr float kNear = 3;
-/// How much the sums of form factors of a face are off by themselves, as a share.
-constexpr float kErrorOfSums = 0.03f;
+/// Rays of a link that is dropped when all of them are blocked.
+constexpr std::uint32_t kRaysOfHidden = 8;
+/// A point counts as this bright at least, in means of the radiosity, when points are picked for rays.
+constexpr float kFaintest = 1e-3f;
+/// Gathers at leaves: each leaves a few percent of the error that was there before.
+constexpr int kGathers = 2;
 /// Sums of form factors are corrected by no more than this.
 constexpr float kLargestCorrection = 1.5f;
+/// A source whose leaves differ from its mean by less than this share shines evenly.
+constexpr float kEven = 0.1f;
+/// Gathering goes down to cells of this radius, as a share of the distance; those of less than kFar count as points.
+constexpr float kResolved = 0.12f, kFar = 0.08f;
+/// Residual of iterations whose result is not the last one.
+constexpr float kRoughly = 0.03f;
+
+/// Random numbers for a point of each of two things.
+struct PairOfPoints {
+  Vec2 pick, u, v;
+};
+/// Evenly distributed pairs: the additive recurrence of Roberts 2018, "The Unreasonable Effectiveness of Quasirandom
+/// Sequences", in six dimensions, shifted at random. Costs a fraction of Sobol points, and few are looked at.
+class PairSequence {
+ public:
+  explicit PairSequence(std::uint32_t key) {
+    for (std::uint32_t k = 0; k < 6; ++k) shift_[k] = hash32(key, k);
+  }
+
+  PairOfPoints operator[](std::uint32_t i) const {
+    // 2^32 / g^k with g^7 = g + 1, so that products are their own fractional parts.
+    constexpr std::uint32_t kStep[6] = {0xe60e2b72u, 0xcebd76d9u, 0xb9c9aa3au, 0xa6f5777fu, 0x9609c71eu, 0x86d516e5u};
+    float x[6];
+    for (std::uint32_t k = 0; k < 6; ++k) x[k] = to_unit_float(shift_[k] + i * kStep[k]);
+    return {{x[0], x[1]}, {x[2], x[3]}, {x[4], x[5]}};
+  }
+
+ private:
+  std::uint32_t shift_[6];
+};
 
 class Solver {
  public:
@@ -50,19 +84,20 @@ class Solver {
 
   QuadTree run(RadiosityReport& report) {
     if (shape_.empty()) return QuadTree(patches_);
-    irradiance_.assign(shape_.elements.size(), Color(0));
-    correction_.assign(shape_.elements.size(), 1.0f);
-    pull();
+    irradiance_ = sources();
+    pull(irradiance_, radiosity_);
     links_.push_back({shape_.root(), shape_.root()});
     // From coarse to fine: what is bright is known before anything is resolved.
     constexpr float kCoarser[] = {8, 3, 1};
     for (const float coarser : kCoarser) {
       refine(coarser * options_.error * mean_radiosity());
-      correct_sums(report);
-      iterate(coarser > 1 ? 0.03f : options_.residual, report);
+      correct_sums();
+      report.residual = iterate(sources(), irradiance_, coarser > 1 ? kRoughly : options_.residual, report);
+      pull(irradiance_, radiosity_);
     }
     report.elements = shape_.elements.size();
     report.links = links_.size();
+    for (int i = 0; i < kGathers; ++i) correct(report);
     return result();
   }
 
@@ -75,9 +110,7 @@ class Solver {
   float brightness(NodeRef n) const {
     return is_cluster(n) ? cluster_brightness_[cluster_index(n)] : max_component(radiosity_[n]);
   }
-  bool lit(NodeRef n) const {
-    return is_cluster(n) ? cluster_lit_[cluster_index(n)] != 0 : !is_black(irradiance_[n] + shape_.elements[n].source);
-  }
+  bool lit(NodeRef n) const { return is_cluster(n) ? cluster_lit_[cluster_index(n)] != 0 : !is_black(irradiance_[n]); }
 
   Verdict judge(Link& link, float allowed, Tracer& tracer) const {
     return link.plain() ? judge_elements(link, allowed, tracer) : judge_clusters(link, allowed, tracer);
@@ -103,8 +136,8 @@ class Solver {
     if (link.rays == 0)
       for (int c = 0; c < 4; ++c) link.factor[c] = form_factor(r.flat, child(s.flat, c)).mean;
     measure_visibility(link, rays, tracer);
-    // What will not be measured again may go. Other links stay, as those that seem visible by chance do.
-    const bool hidden = link.visibility == 0 && link.rays >= rays_of(carried / (options_.error * mean_));
+    // Links of few rays stay, as those that seem visible by chance do: rays are cast for them again at the end.
+    const bool hidden = link.visibility == 0 && link.rays >= kRaysOfHidden;
     return hidden ? Verdict::drop : Verdict::keep;
   }
 
@@ -151,6 +184,7 @@ class Solver {
 
   /// Does the link err too much as one whose ends see each other in part?
   bool partly_hidden(const Link& link, std::uint32_t rays, float importance, Tracer& tracer) const {
+    if (importance <= 2) return false;
     const float visible = visibility(link, 0, rays, tracer);
     return importance * std::sqrt(visible * (1 - visible)) > 1;
   }
@@ -163,11 +197,20 @@ class Solver {
     link.rays = rays;
   }
 
+  /// Mean radiosity of the leaf that a point lies in.
+  float brightness(const Hierarchy::Place& place) const {
+    std::uint32_t e = place.element;
+    for (Vec2 st = place.st; !shape_.elements[e].leaf();)
+      e = shape_.elements[e].children + static_cast<std::uint32_t>(descend(shape_.elements[e].domain.quad, st));
+    return mean_component(radiosity_[e]);
+  }
+
   /// Visibility by a number of rays between pairs of points, which are picked from several times as many by what they exchange:
-  /// near things count more, and see more of each other.
+  /// near things count more, and see more of each other; what is bright sees other things than what lies in the same shadow.
   float visibility(const Link& link, std::uint32_t series, std::uint32_t rays, Tracer& tracer) const {
     constexpr std::uint32_t kFewest = 8, kOfEach = 4, kMost = kOfEach * kMostRays;
     const std::uint32_t key = hash32(link.receiver, hash32(link.source, series));
+    const PairSequence sequence(key);
     const float radius_s = shape_.radius(link.source);
     const bool plain = link.plain();
     const bool near = plain && glm::distance(shape_.center(link.receiver), shape_.center(link.source)) <
@@ -177,28 +220,32 @@ class Solver {
       const SurfaceCell& cell = shape_.elements[link.source].flat.cell;
       seen = AreaLight(cell.o, DVec3(cell.a), DVec3(cell.b), cell.quad);
     }
-    // In clusters many face away from each other, and very near pairs would drown the others.
-    const std::uint32_t pairs = plain ? std::max(kFewest, kOfEach * rays) : kMost;
-    const float softening = plain ? 0 : 0.25f * sqr(radius_s);
-    Hierarchy::Point from[kMost], to[kMost];
+    const float softening = plain ? 0 : 0.25f * sqr(radius_s);  // else very near pairs in clusters would drown the others
+    Hierarchy::Place from[kMost], to[kMost];
     float sums[kMost];
     float sum = 0;
-    for (std::uint32_t i = 0; i < pairs; ++i) {
-      const Vec2 pick = plain ? Vec2(0) : sobol_point(key, 0, i), u = sobol_point(key, 2, i);
-      from[i] = shape_.point(link.receiver, pick.x, sobol_point(key, 1, i));
+    // In clusters many face away from each other: there are more pairs until two face each other.
+    const std::uint32_t wanted = std::max(kFewest, kOfEach * rays);
+    std::uint32_t pairs = 0;
+    for (; pairs < (sum > 0 || plain ? wanted : kMost); ++pairs) {
+      const std::uint32_t i = pairs;
+      const PairOfPoints point = sequence[i];
+      from[i] = shape_.place(link.receiver, point.pick.x, point.u);
       float density = 1;  // of the direction to the source, or in proportion to that of the point on it
       if (near) {
-        const AreaSample s = sample_solid_angle(seen, from[i].at.p, std::abs(seen.height(from[i].at.p)), u);
+        const AreaSample s = sample_solid_angle(seen, from[i].p, std::abs(seen.height(from[i].p)), point.v);
         density = s.pdf_w;
-        to[i] = shape_.point(link.source, Vec2(s.s, s.t));
+        to[i] = shape_.place(link.source, Vec2(s.s, s.t));
       } else {
-        to[i] = shape_.point(link.source, pick.y, u);
+        to[i] = shape_.place(link.source, point.pick.y, point.v);
       }
-      const Vec3 way = to[i].at.p - from[i].at.p;
-      const float facing_r = glm::dot(way, from[i].normal), facing_s = -glm::dot(way, to[i].normal),
-                  distance2 = glm::dot(way, way);
+      const Vec3 way = to[i].p - from[i].p;
+      const float weight = plain ? std::max(kFaintest * mean_, brightness(to[i])) : 1.0f;
+      const float facing_r = glm::dot(way, shape_.elements[from[i].element].flat.normal),
+                  facing_s = -glm::dot(way, shape_.elements[to[i].element].flat.normal), distance2 = glm::dot(way, way);
       if (facing_r > 0 && facing_s > 0 && density > 0)
-        sum += near ? facing_r / (std::sqrt(distance2) * density) : facing_r * facing_s / (distance2 * (distance2 + softening));
+        sum += weight * (near ? facing_r / (std::sqrt(distance2) * density)
+                              : facing_r * facing_s / (distance2 * (distance2 + softening)));
       sums[i] = sum;
     }
     if (!(sum > 0)) return 0;
@@ -207,7 +254,8 @@ class Solver {
     for (std::uint32_t j = 0; j < rays; ++j) {
       const float target = sum * (static_cast<float>(j) + 0.5f) / static_cast<float>(rays);
       const auto i = std::min(static_cast<std::uint32_t>(std::upper_bound(sums, sums + pairs, target) - sums), pairs - 1);
-      if (i != last) last_visible = !tracer.occluded(spawn_ray_to(from[i].at, to[i].at), hash32(key, i), node_);
+      if (i != last)
+        last_visible = !tracer.occluded(spawn_ray_to(shape_.locate(from[i]), shape_.locate(to[i])), hash32(key, i), node_);
       last = i;
       visible += last_visible ? 1 : 0;
     }
@@ -216,6 +264,7 @@ class Solver {
 
   /// Replaces links that may err by more than `allowed` [W/m^2].
   void refine(float allowed) {
+    find_spreads();
     summarise_clusters();
     const std::size_t known = shape_.elements.size();
     const std::size_t limit = available_memory_bytes() / 3 / (4 * sizeof(Link));
@@ -247,7 +296,7 @@ class Solver {
       return x.receiver != y.receiver ? x.receiver < y.receiver : x.source < y.source;
     });
     index_links();
-    pull();
+    pull(irradiance_, radiosity_);
   }
 
   template <class Use>
@@ -262,7 +311,6 @@ class Solver {
       const std::size_t count = shape_.elements.size();
       radiosity_.resize(count, radiosity_[n]);
       irradiance_.resize(count, irradiance_[n]);
-      correction_.resize(count, correction_[n]);
       spread_.resize(count, 0.0f);
     }
     for (std::uint32_t c = 0; c < 4; ++c) use(shape_.elements[n].children + c);
@@ -304,7 +352,8 @@ class Solver {
 
   // --- Transport ------------------------------------------------------------------------------------------------------------
 
-  /// Irradiance that a face with the normal n gets over a link with a cluster: flow * max(0, dot(n, towards)).
+  /// Irradiance that a face with the normal n gets over a link with a cluster, unless it is hidden: flow * max(0, dot(n,
+  /// towards)).
   struct Flow {
     Vec3 towards;  // the source
     Color flow;
@@ -325,11 +374,11 @@ class Solver {
     } else {
       add(link.source);
     }
-    return {towards, sum * (link.visibility * kInvPi / std::max(distance2, sqr(shape_.radius(link.source))))};
+    return {towards, sum * (kInvPi / std::max(distance2, sqr(shape_.radius(link.source))))};
   }
 
   /// What a link between elements brings without occlusion.
-  Color gathered(const Link& link, const std::vector<Color>& radiosity) const {
+  Color unoccluded(const Link& link, const std::vector<Color>& radiosity) const {
     const Element& source = shape_.elements[link.source];
     const float* f = link.factor;
     if (source.leaf()) return (f[0] + f[1] + f[2] + f[3]) * radiosity[link.source];
@@ -337,12 +386,15 @@ class Solver {
     return f[0] * quarter[0] + f[1] * quarter[1] + f[2] * quarter[2] + f[3] * quarter[3];
   }
 
-  /// Irradiance on each element that `radiosity` makes, without corrections.
+  /// Irradiance on each element that `radiosity` makes.
   std::vector<Color> transport(const std::vector<Color>& radiosity) const {
     // Links with clusters on their receiving side: once each, then by every face below.
     const std::size_t base = first_of_cluster_[0];
     std::vector<Flow> flows(links_.size() - base);
-    context_.workers().parallel_for(flows.size(), 64, [&](std::size_t i) { flows[i] = flow(links_[base + i], radiosity); });
+    context_.workers().parallel_for(flows.size(), 64, [&](std::size_t i) {
+      flows[i] = flow(links_[base + i], radiosity);
+      flows[i].flow *= links_[base + i].visibility;
+    });
     std::vector<Color> arriving(shape_.elements.size(), Color(0));
     context_.workers().parallel_for(shape_.elements.size(), 256, [&](std::size_t i) {
       const Element& element = shape_.elements[i];
@@ -351,10 +403,10 @@ class Solver {
       for (std::size_t l = first_of_element_[i]; l < first_of_element_[i + 1]; ++l) {
         const Link& link = links_[l];
         if (link.plain()) {
-          sum += link.visibility * gathered(link, radiosity);
+          sum += link.visibility * unoccluded(link, radiosity);
         } else {
           const Flow f = flow(link, radiosity);
-          sum += std::max(0.0f, glm::dot(n, f.towards)) * f.flow;
+          sum += link.visibility * std::max(0.0f, glm::dot(n, f.towards)) * f.flow;
         }
       }
       if (element.parent == kNoNode) {
@@ -368,26 +420,38 @@ class Solver {
     return arriving;
   }
 
-  /// Radiosity of leaves from their irradiance, means and spreads of the others.
-  void pull() {
+  /// Irradiance on the leaves before any transport.
+  std::vector<Color> sources() const {
+    std::vector<Color> irradiance(shape_.elements.size(), Color(0));
+    for (std::size_t i = 0; i < irradiance.size(); ++i)
+      if (shape_.elements[i].leaf()) irradiance[i] = shape_.elements[i].source;
+    return irradiance;
+  }
+
+  /// Radiosity of the leaves from their irradiance; means of both for all others.
+  void pull(std::vector<Color>& irradiance, std::vector<Color>& radiosity) const {
     const std::size_t count = shape_.elements.size();
-    radiosity_.resize(count);
-    spread_.assign(count, 0.0f);
+    radiosity.resize(count);
     for (std::size_t i = count; i-- > 0;) {
       const Element& e = shape_.elements[i];
       if (e.leaf()) {
-        radiosity_[i] = e.albedo * (e.source + irradiance_[i]);
+        radiosity[i] = e.albedo * irradiance[i];
         continue;
       }
-      radiosity_[i] = irradiance_[i] = Color(0);
+      radiosity[i] = irradiance[i] = Color(0);
       for (std::uint32_t c = e.children; c < e.children + 4; ++c) {
-        radiosity_[i] += 0.25f * radiosity_[c];
-        irradiance_[i] += 0.25f * irradiance_[c];
+        radiosity[i] += 0.25f * radiosity[c];
+        irradiance[i] += 0.25f * irradiance[c];
       }
-      for (std::uint32_t c = e.children; c < e.children + 4; ++c) {
-        const Color d = glm::abs(radiosity_[c] - radiosity_[i]);
-        spread_[i] = std::max(spread_[i], max_component(d) + spread_[c]);
-      }
+    }
+  }
+
+  void find_spreads() {
+    spread_.assign(shape_.elements.size(), 0.0f);
+    for (std::size_t i = spread_.size(); i-- > 0;) {
+      const Element& e = shape_.elements[i];
+      for (std::uint32_t c = e.children; c < e.children + 4 && !e.leaf(); ++c)
+        spread_[i] = std::max(spread_[i], max_component(glm::abs(radiosity_[c] - radiosity_[i])) + spread_[c]);
     }
   }
 
@@ -403,89 +467,224 @@ class Solver {
     return mean_;
   }
 
-  /// Form factors of a cell add up to the share of surfaces in what it sees. Where that is 1, each cell is corrected to it;
-  /// elsewhere only whole faces are, to what rays from them have found, as far as that is known better than the sums.
-  void correct_sums(RadiosityReport& report) {
-    std::vector<Color> sums = transport(std::vector<Color>(shape_.elements.size(), Color(1)));
-    double off = 0, whole = 0;
-    for (std::size_t i = 0; i < sums.size(); ++i) {
-      const auto e = static_cast<NodeRef>(i);
-      const float sum = sums[i].x;
-      correction_[i] = sum > 0 ? std::clamp(1 / sum, 1 / kLargestCorrection, kLargestCorrection) : 1.0f;
-      if (!shape_.elements[i].leaf() || !face_of(e).enclosed() || !lit(e) || !shape_.receives(e)) continue;
-      const auto a = static_cast<double>(shape_.elements[i].flat.area);
-      off += a * std::abs(1 - static_cast<double>(sum));
-      whole += a;
-    }
-    report.mean_correction = whole > 0 ? off / whole : 0;
-
-    // From leaves to faces. The mean of all open faces is known best.
-    for (std::size_t i = sums.size(); i-- > 0;) {
-      const Element& e = shape_.elements[i];
-      if (!e.leaf()) sums[i] = 0.25f * (sums[e.children] + sums[e.children + 1] + sums[e.children + 2] + sums[e.children + 3]);
-    }
-    double found = 0, seen = 0;
-    for (std::size_t i = 0; i < shape_.faces.size(); ++i) {
-      const Face& face = shape_.faces[i];
-      if (face.enclosed() || !face.receives) continue;
-      const auto a = static_cast<double>(shape_.elements[i].flat.area);
-      found += a * static_cast<double>(sums[i].x);
-      seen += a * static_cast<double>(face.seen());
-    }
-    const float all = found > 0 ? static_cast<float>(seen / found) : 1.0f;
-    for (std::size_t i = 0; i < sums.size(); ++i) {
-      const Face& face = face_of(static_cast<NodeRef>(i));
-      if (face.enclosed()) continue;
-      const float sum = sums[shape_.elements[i].face].x,
-                  variance = (1 - face.seen()) / std::max(1.0f, static_cast<float>(face.hits));
-      const float trust = sqr(kErrorOfSums) / (sqr(kErrorOfSums) + variance);
-      const float own = sum > 0 ? face.seen() / sum / all : 1.0f;
-      correction_[i] = std::clamp(all * (1 + trust * (own - 1)), 1 / kLargestCorrection, kLargestCorrection);
-    }
+  /// Form factors of a cell add up to 1 where its face sees nothing but surfaces, and nowhere to more.
+  void correct_sums() {
+    correction_.clear();
+    const std::vector<Color> sums = transport(std::vector<Color>(shape_.elements.size(), Color(1)));
+    for (const Color& sum : sums) correction_.push_back(correction(static_cast<std::uint32_t>(correction_.size()), sum.x));
   }
-  const Face& face_of(NodeRef element) const { return shape_.faces[shape_.elements[element].face]; }
+  float correction(std::uint32_t element, float sum) const {
+    if (!(sum > 0)) return 1;
+    const bool closed = shape_.faces[shape_.elements[element].face].enclosed;
+    return std::clamp(1 / sum, 1 / kLargestCorrection, closed ? kLargestCorrection : 1.0f);
+  }
 
-  /// Jacobi iteration until what is still to come is less than `residual` of what is there.
-  void iterate(float residual, RadiosityReport& report) {
-    double before = 0;
+  /// Jacobi iteration of E = added + K rho E for the leaves, K by links, until what is still to come is less than `residual` of
+  /// what transport has brought; returns about which share that is.
+  double iterate(const std::vector<Color>& added, std::vector<Color>& irradiance, float residual,
+                 RadiosityReport& report) const {
+    std::vector<Color> radiosity;
+    double before = 0, to_come = 0;
     for (std::int64_t i = 0; i < options_.iterations; ++i) {
-      std::vector<Color> next = transport(radiosity_);
+      pull(irradiance, radiosity);
+      std::vector<Color> next = transport(radiosity);
       double change = 0, size = 0;
       for (std::size_t k = 0; k < next.size(); ++k) {
         const Element& e = shape_.elements[k];
         if (!e.leaf()) continue;
-        next[k] = shape_.faces[e.face].receives ? next[k] * correction_[k] : Color(0);
-        const auto a = static_cast<double>(e.flat.area);
-        const Color d = glm::abs(next[k] - irradiance_[k]);
-        change += a * static_cast<double>(d.x + d.y + d.z);
-        size += a * static_cast<double>(next[k].x + next[k].y + next[k].z);
+        next[k] *= shape_.faces[e.face].receives ? correction_[k] : 0.0f;
+        size += absolute_flux(e, next[k]);
+        next[k] += added[k];
+        change += absolute_flux(e, next[k] - irradiance[k]);
       }
-      irradiance_ = std::move(next);
-      pull();
+      irradiance = std::move(next);
       // Changes fall like a geometric series.
       const double ratio = before > 0 ? std::min(change / before, 0.999) : 0.9;
       before = change;
       ++report.iterations;
-      report.residual = size > 0 ? change / size * ratio / (1 - ratio) : 0;
-      if (report.residual <= static_cast<double>(residual)) break;
+      to_come = size > 0 ? change / size * ratio / (1 - ratio) : 0;
+      if (to_come <= static_cast<double>(residual)) break;
     }
+    return to_come;
+  }
+  static double absolute_flux(const Element& e, const Color& irradiance) {
+    const Color size = glm::abs(irradiance);
+    return static_cast<double>(e.flat.area) * static_cast<double>(size.x + size.y + size.z);
+  }
+
+  // --- Gathering ------------------------------------------------------------------------------------------------------------
+
+  /// Deferred correction: gathers once more, at points, and lets links transport only what that has changed. A link is wrong
+  /// in the same way all over its receiver; so are its errors' errors, but they are small.
+  void correct(RadiosityReport& report) {
+    std::vector<Color> change = gather_at_leaves();
+    const double size = total(change);
+    for (std::size_t i = 0; i < change.size(); ++i)
+      change[i] = shape_.elements[i].leaf() ? change[i] + shape_.elements[i].source - irradiance_[i] : Color(0);
+    const std::vector<Color> added = change;
+    iterate(added, change, kRoughly, report);
+    report.correction = size > 0 ? total(change) / size : 0;
+    for (std::size_t i = 0; i < change.size(); ++i)
+      irradiance_[i] = glm::max(irradiance_[i] + change[i], shape_.elements[i].source);
+    pull(irradiance_, radiosity_);
+  }
+  /// Flux on the leaves, without regard to signs.
+  double total(const std::vector<Color>& irradiance) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < irradiance.size(); ++i)
+      if (shape_.elements[i].leaf()) sum += absolute_flux(shape_.elements[i], irradiance[i]);
+    return sum;
+  }
+
+  /// Irradiance in the middle of each leaf that `radiosity_` makes, over the links of the leaf and of all that it is a part of,
+  /// with form factors of and rays from that point.
+  std::vector<Color> gather_at_leaves() {
+    find_spreads();
+    const std::vector<Color> one(shape_.elements.size(), Color(1));
+    std::vector<Flow> flows(links_.size());
+    std::vector<float> sums(links_.size());
+    context_.workers().parallel_for(links_.size(), 64, [&](std::size_t l) {
+      if (links_[l].plain()) return;
+      flows[l] = flow(links_[l], radiosity_);
+      sums[l] = flow(links_[l], one).flow.x;
+    });
+    std::vector<Color> found(shape_.elements.size(), Color(0));
+    context_.for_chunks(found.size(), 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
+      tracer.enter(node_);
+      for (std::size_t i = begin; i < end; ++i) {
+        const Element& element = shape_.elements[i];
+        if (!element.leaf() || !shape_.faces[element.face].receives) continue;
+        const Receiver receiver(shape_, static_cast<std::uint32_t>(i));
+        Gathered all;
+        const auto gather = [&](const std::vector<std::size_t>& first, std::size_t n) {
+          for (std::size_t l = first[n]; l < first[n + 1]; ++l) {
+            const Link& link = links_[l];
+            Gathered g;
+            if (link.plain())
+              add_unoccluded(link.source, receiver, g);
+            else
+              g = unoccluded(link, flows[l], sums[l], receiver);
+            occlude(g, link, receiver, tracer);
+            all.E += g.E;
+            all.sum += g.sum;
+          }
+        };
+        for (std::uint32_t e = receiver.element; e != kNoNode; e = shape_.elements[e].parent) gather(first_of_element_, e);
+        for (NodeRef c = shape_.faces[element.face].parent; c != kNoNode; c = shape_.clusters[cluster_index(c)].parent)
+          gather(first_of_cluster_, cluster_index(c));
+        found[i] = correction(receiver.element, all.sum) * all.E;
+      }
+    });
+    return found;
+  }
+
+  struct Gathered {
+    Color E{0};
+    float sum = 0;  // of form factors
+  };
+
+  /// The middle of a leaf.
+  struct Receiver {
+    Receiver(const Hierarchy& shape, std::uint32_t number)
+        : element(number), p(shape.center(number)), n(shape.elements[number].flat.normal) {
+      at = shape.locate(shape.place(number, shape.elements[number].domain.quad ? Vec2(0.5f) : Vec2(1.0f / 3)));
+    }
+    std::uint32_t element;
+    Vec3 p, n;
+    SurfacePosition at;
+  };
+
+  /// What an element brings if nothing is in between: by its leaves where it is near, for radiosity varies over it.
+  void add_unoccluded(std::uint32_t element, const Receiver& receiver, Gathered& g) const {
+    const Element& e = shape_.elements[element];
+    const Vec3 way = e.flat.cell.center() - receiver.p;
+    const float distance = glm::length(way), facing = glm::dot(way, receiver.n);
+    if (!e.leaf() && e.flat.radius > kResolved * distance) {
+      for (std::uint32_t c = 0; c < 4; ++c) add_unoccluded(e.children + c, receiver, g);
+      return;
+    }
+    const bool far = e.flat.radius < kFar * distance && facing > e.flat.radius;
+    const float f = far ? facing * std::max(0.0f, -glm::dot(way, e.flat.normal)) * e.flat.area * kInvPi / sqr(sqr(distance))
+                        : point_form_factor(receiver.p, receiver.n, e.flat);
+    g.E += f * radiosity_[element];
+    g.sum += f;
+  }
+
+  /// The same of a link to or from a cluster, which brings `flow`, `sum` of form factors, to the center of its receiver.
+  Gathered unoccluded(const Link& link, const Flow& flow, float sum, const Receiver& receiver) const {
+    const Vec3 source = shape_.center(link.source), way = source - receiver.p;
+    const float facing = glm::dot(receiver.n, way), distance2 = glm::dot(way, way);
+    if (!(facing > 0)) return {};
+    const float least = sqr(shape_.radius(link.source)), far = glm::distance(source, shape_.center(link.receiver));
+    const float f = facing / std::sqrt(distance2) * std::max(sqr(far), least) / std::max(distance2, least);
+    return {f * flow.flow, f * sum};
+  }
+
+  /// Takes off what is hidden. In the mean over rays to points that are picked by what they bring, or, for the sum of form
+  /// factors of a source that does not shine evenly, to any.
+  void occlude(Gathered& g, const Link& link, const Receiver& receiver, Tracer& tracer) const {
+    if (!(g.sum > 0)) return;
+    const std::uint32_t rays = rays_of(brightness(link.source, link.receiver) * g.sum / (options_.error * mean_));
+    const float visible = visible_share(link, receiver, rays, true, tracer);
+    const bool even = is_cluster(link.source) || spread_[link.source] <= kEven * max_component(radiosity_[link.source]);
+    const bool closed = shape_.faces[shape_.elements[receiver.element].face].enclosed;
+    g.E *= visible;
+    g.sum *= even || !closed ? visible : visible_share(link, receiver, rays, false, tracer);
+  }
+
+  float visible_share(const Link& link, const Receiver& receiver, std::uint32_t rays, bool bright, Tracer& tracer) const {
+    constexpr std::uint32_t kTries = 4;  // to find a point that faces the receiver
+    const std::uint32_t key = hash32(receiver.element, hash32(link.source, bright ? 2 : 3));
+    const PairSequence sequence(key);
+    std::uint32_t visible = 0;
+    for (std::uint32_t r = 0; r < rays; ++r) {
+      Hierarchy::Place place{};
+      for (std::uint32_t i = kTries * r; i < kTries * (r + 1); ++i) {
+        const PairOfPoints random = sequence[i];
+        place =
+            bright ? bright_place(link.source, random.pick.x, random.u) : shape_.place(link.source, random.pick.x, random.u);
+        const Vec3 way = place.p - receiver.p;
+        if (glm::dot(way, receiver.n) > 0 && glm::dot(way, shape_.elements[place.element].flat.normal) < 0) break;
+      }
+      if (!tracer.occluded(spawn_ray_to(receiver.at, shape_.locate(place)), hash32(key, r), node_)) ++visible;
+    }
+    return static_cast<float>(visible) / static_cast<float>(rays);
+  }
+
+  /// A point of a leaf below an element, picked by its radiosity; of a cluster any.
+  Hierarchy::Place bright_place(NodeRef n, float pick, const Vec2& u) const {
+    while (!is_cluster(n) && !shape_.elements[n].leaf()) {
+      const std::uint32_t first = shape_.elements[n].children;
+      float up_to[4], sum = 0;
+      for (std::uint32_t c = 0; c < 4; ++c) up_to[c] = sum += mean_component(radiosity_[first + c]);
+      if (!(sum > 0)) break;
+      std::uint32_t c = 0;
+      while (c < 3 && pick * sum >= up_to[c]) ++c;
+      const float below = c > 0 ? up_to[c - 1] : 0;
+      pick = std::min((pick * sum - below) / (up_to[c] - below), kOneMinusEpsilon);
+      n = first + c;
+    }
+    return shape_.place(n, pick, u);
   }
 
   QuadTree result() const {
     const Scene& scene = context_.scene();
     QuadTree tree(patches_);
+    std::vector<Color> scattered = irradiance_, radiosity;
+    for (std::size_t i = 0; i < scattered.size(); ++i) scattered[i] -= shape_.elements[i].source;
+    pull(scattered, radiosity);
     for (std::uint32_t i = 0; i < shape_.faces.size(); ++i) {
       const Face& face = shape_.faces[i];
       const bool wanted = options_.to(scene.part_tags(patches_->part(face.id / 2)));
       if (!face.receives || !wanted) continue;
-      std::vector<QuadTreeNode> nodes{{irradiance_[i]}};
+      std::vector<QuadTreeNode> nodes{{scattered[i]}};
       std::vector<std::uint32_t> from{i};
       for (std::size_t k = 0; k < nodes.size(); ++k) {
         const Element& e = shape_.elements[from[k]];
         if (e.leaf()) continue;
         nodes[k].children = static_cast<std::uint32_t>(nodes.size());
         for (std::uint32_t c = e.children; c < e.children + 4; ++c) {
-          nodes.push_back({irradiance_[c]});
+          nodes.push_back({scattered[c]});
           from.push_back(c);
         }
       }
@@ -503,9 +702,9 @@ class Solver {
 
   std::vector<Link> links_;  // those of elements first, in order of receivers
   std::vector<std::size_t> first_of_element_, first_of_cluster_;
-  std::vector<Color> radiosity_, irradiance_;  // by element; irradiance: what is solved for
+  std::vector<Color> radiosity_, irradiance_;  // by element; irradiance: all of it, that of the input too
+  std::vector<float> correction_;              // by element, of what links bring
   std::vector<float> spread_;                  // by element: how much its leaves' radiosity differs from its own
-  std::vector<float> correction_;              // by element, of leaves
   std::vector<float> cluster_brightness_;
   std::vector<std::uint8_t> cluster_lit_;
   float mean_ = 0;  // radiosity

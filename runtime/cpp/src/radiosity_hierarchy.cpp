@@ -46,15 +46,14 @@ Hierarchy::Hierarchy(PrepareContext& context, NodeId node, const QuadTree& in, c
   measure_albedo(0);
 }
 
-/// Casts rays from each face, to learn which faces exchange light at all, and which share of what each sees is surface.
+/// Casts rays from each face, to learn which faces exchange light at all, and which see nothing but surfaces.
 void Hierarchy::find_faces(NodeId node, const QuadTree& in, const RadiosityOptions& options) {
   constexpr std::uint32_t kFewest = 16, kMost = 8192;
   constexpr float kAreaOfRay = 1e-4f;
   const Scene& scene = context_.scene();
   const auto count = static_cast<std::uint32_t>(patches_.face_count());
   std::vector<std::vector<std::uint32_t>> seen(count);  // faces
-  rays_.assign(count, 0);
-  hits_.assign(count, 0);
+  enclosed_.assign(count, 0);
   context_.for_chunks(count, 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
     tracer.enter(node);
     for (auto face = static_cast<std::uint32_t>(begin); face < end; ++face) {
@@ -62,16 +61,18 @@ void Hierarchy::find_faces(NodeId node, const QuadTree& in, const RadiosityOptio
       const float size = area(patches_.surface(patch));
       if (!(size > 0)) continue;
       const std::uint32_t rays = std::clamp(static_cast<std::uint32_t>(size / kAreaOfRay), kFewest, kMost);
-      rays_[face] = rays;
       const std::uint32_t key = hash32(face, node);
+      enclosed_[face] = 1;
       for (std::uint32_t i = 0; i < rays; ++i) {
         SurfacePosition at;
         scene.locate(patches_.hit(patch, patches_.domain(patch).point(sobol_point(key, 0, i))), at);
         const Frame frame = make_frame(Patches::is_front(face) ? at.ng : -at.ng);
         const Vec3 direction = frame.to_world(sample_cosine(sobol_point(key, 1, i)));
         const Hit hit = tracer.intersect(spawn_ray(at, direction), hash32(key, i), node, RayKind::gather);
-        if (!hit.found()) continue;
-        ++hits_[face];
+        if (!hit.found()) {
+          enclosed_[face] = 0;
+          continue;
+        }
         SurfacePosition there;
         scene.locate(hit, there);
         const std::uint32_t other = patches_.locate(hit.triangle, hit.u, hit.v).patch;
@@ -99,8 +100,7 @@ void Hierarchy::add_face(std::uint32_t id, const RadiosityOptions& options) {
   const bool diffuse = scatters_diffusely(scene, part, Patches::is_front(id));
   face.scatters = diffuse && options.from(scene.part_tags(part));
   face.receives = face.scatters || (diffuse && options.to(scene.part_tags(part)));
-  face.rays = rays_[id];
-  face.hits = hits_[id];
+  face.enclosed = enclosed_[id] != 0;
   face.albedo_varies = face.scatters && albedo_varies(scene, part);
   if (face.scatters && !face.albedo_varies)
     face.albedo = diffuse_albedo(scene, patches_.hit(id / 2, patches_.domain(id / 2).center()), Patches::is_front(id));
@@ -229,7 +229,7 @@ void Hierarchy::measure_albedo(std::size_t first) {
   });
 }
 
-Hierarchy::Point Hierarchy::point(NodeRef n, float pick, const Vec2& u) const {
+Hierarchy::Place Hierarchy::place(NodeRef n, float pick, const Vec2& u) const {
   if (is_cluster(n)) {
     const Cluster& c = clusters[cluster_index(n)];
     const double begin = area_before_[c.first], end = area_before_[c.first + c.count];
@@ -238,15 +238,15 @@ Hierarchy::Point Hierarchy::point(NodeRef n, float pick, const Vec2& u) const {
                              area_before_.begin()) -
         1;
   }
-  return point(n, DomainCell{Vec2(0), Vec2(1, 0), Vec2(0, 1), elements[n].domain.quad}.point(u));
+  return place(n, DomainCell{Vec2(0), Vec2(1, 0), Vec2(0, 1), elements[n].domain.quad}.point(u));
 }
 
-Hierarchy::Point Hierarchy::point(std::uint32_t element, const Vec2& st) const {
-  const Element& e = elements[element];
-  Point p;
-  context_.scene().locate(patches_.hit(faces[e.face].id / 2, e.domain.o + st.x * e.domain.a + st.y * e.domain.b), p.at);
-  p.normal = e.flat.normal;
-  return p;
+SurfacePosition Hierarchy::locate(const Place& place) const {
+  const Element& e = elements[place.element];
+  SurfacePosition at;
+  context_.scene().locate(patches_.hit(faces[e.face].id / 2, e.domain.o + place.st.x * e.domain.a + place.st.y * e.domain.b),
+                          at);
+  return at;
 }
 
 }  // namespace ln::radiosity

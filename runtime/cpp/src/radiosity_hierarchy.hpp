@@ -26,12 +26,8 @@ struct Face {
   bool receives = false;     // what arrives here is wanted, or scattered
   bool scatters = false;
   bool albedo_varies = false;
-  Color albedo{0};         // where it does not vary
-  std::uint32_t rays = 0;  // that were cast from it
-  std::uint32_t hits = 0;  // of these; their share is what form factors add up to
-
-  bool enclosed() const { return hits == rays; }
-  float seen() const { return static_cast<float>(hits) / static_cast<float>(rays); }
+  bool enclosed = false;  // all that it sees are surfaces
+  Color albedo{0};        // where it does not vary
 };
 
 /// A cell of a face. Elements stand behind their parents.
@@ -80,14 +76,20 @@ class Hierarchy {
   /// Albedos of leaves from `first` on.
   void measure_albedo(std::size_t first);
 
-  /// A point of an element or of a cluster, from two random points, and its normal.
-  struct Point {
-    SurfacePosition at;
-    Vec3 normal;
+  /// A point of an element.
+  struct Place {
+    std::uint32_t element;
+    Vec2 st;  // relative to its cell: o + st.x a + st.y b
+    Vec3 p;
   };
-  Point point(NodeRef n, float pick, const Vec2& u) const;
-  /// The point o + st.x a + st.y b of an element's cell.
-  Point point(std::uint32_t element, const Vec2& st) const;
+  /// One of an element or of a cluster, from random numbers.
+  Place place(NodeRef n, float pick, const Vec2& u) const;
+  Place place(std::uint32_t element, const Vec2& st) const {
+    const SurfaceCell& cell = elements[element].flat.cell;
+    return {element, st, cell.o + st.x * cell.a + st.y * cell.b};
+  }
+  /// For rays from there.
+  SurfacePosition locate(const Place& place) const;
 
   std::vector<Face> faces;
   std::vector<Element> elements;
@@ -102,8 +104,8 @@ class Hierarchy {
   PrepareContext& context_;
   const Patches& patches_;
   float smallest_area_;
-  std::vector<std::uint32_t> rays_, hits_;  // by face of Patches
-  std::vector<double> area_before_;         // sum of the areas of the faces before
+  std::vector<std::uint8_t> enclosed_;  // by face of Patches
+  std::vector<double> area_before_;     // sum of the areas of the faces before
 };
 
 }  // namespace ln::radiosity

@@ -7,7 +7,7 @@
 namespace ln {
 
 struct RadiosityOptions {
-  float error = 0.01f;     // of a link, as a share of the mean radiosity
+  float error = 0.03f;     // of a link, as a share of the mean radiosity
   float smallest = 0;      // cells of half this side are not made [normalised units]; 0: 1/128 of the scene's half diagonal
   float residual = 1e-3f;  // bound of what further iterations would add, as a share of the result
   std::int64_t iterations = 200;
@@ -19,7 +19,7 @@ struct RadiosityOptions {
 struct RadiosityReport {
   std::size_t elements = 0, links = 0, iterations = 0;
   double residual = 0;
-  double mean_correction = 0;  // mean of |1 - sum of a leaf's form factors| over enclosed leaves that carry light
+  double correction = 0;  // how much the last gather at points has changed the light, as a share
 };
 
 /// Solves E = K rho (E_in + E), with K the transport of radiosity to irradiance and rho the diffuse albedo: the multiply

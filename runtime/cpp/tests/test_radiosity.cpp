@@ -75,6 +75,7 @@ void check_even_space(int shape, int pieces, int rings, float error) {
   CHECK(out.flux().y / whole == doctest::Approx(4).epsilon(0.005));
   CHECK(out.flux().z / whole == doctest::Approx(1.0 / 9).epsilon(0.005));
   CHECK(report.residual <= 1e-3);
+  CHECK(report.correction < 0.02);
 }
 
 /// Links, and rays, of radiosity in a box with walls of 16 times the pieces, over those in the first.

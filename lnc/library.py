@@ -71,7 +71,8 @@ class Parameter:
 class PathRule:
     """One alternative of `paths CONTENT = ...`: the light at a port (or a new `L`), then events.
 
-    `port` is None where the light starts here. `emitter` is "area", "delta", the name of a tags parameter, or None.
+    `port` is None where the light starts here. `emitter` is "area", "delta", the name of a tags parameter, or None. At
+    a port whose light has left its emitters the tags say on which surfaces it is read, to be used on any.
     `tail` holds letters and the names of path parameters; None is the empty path.
     """
 

@@ -3,9 +3,10 @@
     indirect = Radiosity(direct, from = room)     direct_tree = PointsToQuadTree(direct, to = room)
                                                   indirect    = Radiosity(direct_tree, from = room)
 
-An operator whose declared light paths go on behind a port with an event on a tag (`in D@from+`) reads that port on
-such surfaces only. If all readers of a converter do so for the same tag, its parameter `to` says so, and surfaces that
-nobody asks about are not sampled. Points are left alone: they are asked where they are needed, and nowhere else.
+An operator whose declared light paths go on behind a port with an event on a tag (`in D@from+`), or begin with the port
+on a tag (`in@from`), reads that port on such surfaces only. If all readers of a converter do so for the same tag, its
+parameter `to` says so, and surfaces that nobody asks about are not sampled. Points are left alone: they are asked where
+they are needed, and nowhere else.
 
 On entry: a network with converters. On exit: the same nodes; the light paths of results are unchanged.
 """
@@ -44,7 +45,10 @@ def _read_at(node: Node, given: Input) -> ast.TagRef | None:
             if isinstance(head, ast.PathRepeat) and head.low > 0:
                 head = head.item
             # Not `via@from`, for `via` may be empty.
-            found.add(tag_value(node, head.tag.name) if isinstance(head, ast.PathEvents) and head.tag else None)
+            name = rule.emitter
+            if head is not None:
+                name = head.tag.name if isinstance(head, ast.PathEvents) and head.tag else None
+            found.add(tag_value(node, name) if name else None)
     return found.pop() if len(found) == 1 else None
 
 

@@ -182,6 +182,9 @@ class PathAutomaton:
     def _fill(self, node: Node, rule: PathRule, content: str, letters: int, left: int | None, entry: int) -> None:
         target = content if rule.content == "unchanged" else rule.content
         if content != "emission":
+            if rule.emitter and tag_value(node, rule.emitter):  # read there, and taken for what arrives anywhere
+                read = letters & self.alphabet.events("DGS", self._tagged(node, rule.emitter))
+                letters = self.alphabet.events() if read else 0
             self._events(node, rule, target, entry, content, letters, left)
             return
         emitters = letters & self._emitters(node, rule)

@@ -6,24 +6,13 @@
 #include "ln/emitter_shapes.hpp"
 #include "ln/error.hpp"
 #include "ln/stats.hpp"
-#include "radiosity_hierarchy.hpp"
+#include "radiosity_links.hpp"
 
 namespace ln {
 
 namespace radiosity {
 
 namespace {
-
-/// Light goes from `source` to `receiver`. Between elements as radiosity * factor * visibility of each quarter of the source,
-/// the same all over the receiver; with a cluster, faces count with their own normals as if each were at the cluster's center.
-struct Link {
-  NodeRef receiver, source;
-  float factor[4] = {};  // form factors of the source's quarters without occlusion, between elements
-  float visibility = 0;
-  std::uint32_t rays = 0;  // that have been cast for the visibility
-
-  bool plain() const { return !is_cluster(receiver) && !is_cluster(source); }
-};
 
 enum class Verdict : std::uint8_t { drop, keep, divide_receiver, divide_source };
 
@@ -53,44 +42,26 @@ constexpr float kResolved = 0.12f, kFar = 0.08f;
 /// Residual of iterations whose result is not the last one.
 constexpr float kRoughly = 0.03f;
 
-/// Random numbers for a point of each of two things.
-struct PairOfPoints {
-  Vec2 pick, u, v;
-};
-/// Evenly distributed pairs: the additive recurrence of Roberts 2018, "The Unreasonable Effectiveness of Quasirandom
-/// Sequences", in six dimensions, shifted at random. Costs a fraction of Sobol points, and few are looked at.
-class PairSequence {
- public:
-  explicit PairSequence(std::uint32_t key) {
-    for (std::uint32_t k = 0; k < 6; ++k) shift_[k] = hash32(key, k);
-  }
-
-  PairOfPoints operator[](std::uint32_t i) const {
-    // 2^32 / g^k with g^7 = g + 1, so that products are their own fractional parts.
-    constexpr std::uint32_t kStep[6] = {0xe60e2b72u, 0xcebd76d9u, 0xb9c9aa3au, 0xa6f5777fu, 0x9609c71eu, 0x86d516e5u};
-    float x[6];
-    for (std::uint32_t k = 0; k < 6; ++k) x[k] = to_unit_float(shift_[k] + i * kStep[k]);
-    return {{x[0], x[1]}, {x[2], x[3]}, {x[4], x[5]}};
-  }
-
- private:
-  std::uint32_t shift_[6];
-};
-
 class Solver {
  public:
   Solver(PrepareContext& context, NodeId node, const QuadTree& in, const RadiosityOptions& options)
-      : context_(context), node_(node), options_(options), shape_(context, node, in, options), patches_(in.shared_patches()) {}
+      : context_(context),
+        node_(node),
+        options_(options),
+        shape_(context, node, in, options),
+        patches_(in.shared_patches()),
+        links_(shape_) {}
 
   QuadTree run(RadiosityReport& report) {
     if (shape_.empty()) return QuadTree(patches_);
     irradiance_ = sources();
     pull(irradiance_, radiosity_);
-    links_.push_back({shape_.root(), shape_.root()});
+    links_.set({{shape_.root(), shape_.root()}});
     // From coarse to fine: what is bright is known before anything is resolved.
     constexpr float kCoarser[] = {8, 3, 1};
     for (const float coarser : kCoarser) {
-      refine(coarser * options_.error * mean_radiosity());
+      if (!(mean_radiosity() > 0)) return QuadTree(patches_);
+      refine(coarser * options_.error * mean_);
       correct_sums();
       report.residual = iterate(sources(), irradiance_, coarser > 1 ? kRoughly : options_.residual, report);
       pull(irradiance_, radiosity_);
@@ -268,7 +239,7 @@ class Solver {
     summarise_clusters();
     const std::size_t known = shape_.elements.size();
     const std::size_t limit = available_memory_bytes() / 3 / (4 * sizeof(Link));
-    std::vector<Link> open = std::move(links_), kept;
+    std::vector<Link> open = links_.take(), kept;
     std::vector<Verdict> verdicts;
     while (!open.empty()) {
       verdicts.resize(open.size());
@@ -290,12 +261,8 @@ class Solver {
                     " links between surfaces, a third of the free memory; raise its parameter 'error'");
       open = std::move(next);
     }
-    links_ = std::move(kept);
+    links_.set(std::move(kept));
     shape_.measure_albedo(known);
-    std::sort(links_.begin(), links_.end(), [](const Link& x, const Link& y) {
-      return x.receiver != y.receiver ? x.receiver < y.receiver : x.source < y.source;
-    });
-    index_links();
     pull(irradiance_, radiosity_);
   }
 
@@ -332,93 +299,7 @@ class Solver {
     }
   }
 
-  /// Where the links of each element and cluster begin; those with clusters are numbered, too.
-  void index_links() {
-    first_of_element_.assign(shape_.elements.size() + 1, 0);
-    first_of_cluster_.assign(shape_.clusters.size() + 1, 0);
-    std::size_t plain = 0;
-    for (const Link& link : links_) {
-      if (is_cluster(link.receiver)) {
-        ++first_of_cluster_[cluster_index(link.receiver) + 1];
-      } else {
-        ++first_of_element_[link.receiver + 1];
-        ++plain;
-      }
-    }
-    for (std::size_t i = 1; i < first_of_element_.size(); ++i) first_of_element_[i] += first_of_element_[i - 1];
-    first_of_cluster_[0] = plain;
-    for (std::size_t i = 1; i < first_of_cluster_.size(); ++i) first_of_cluster_[i] += first_of_cluster_[i - 1];
-  }
-
-  // --- Transport ------------------------------------------------------------------------------------------------------------
-
-  /// Irradiance that a face with the normal n gets over a link with a cluster, unless it is hidden: flow * max(0, dot(n,
-  /// towards)).
-  struct Flow {
-    Vec3 towards;  // the source
-    Color flow;
-  };
-  Flow flow(const Link& link, const std::vector<Color>& radiosity) const {
-    const Vec3 way = shape_.center(link.source) - shape_.center(link.receiver);
-    const float distance2 = std::max(glm::dot(way, way), 1e-12f);
-    const Vec3 towards = way / std::sqrt(distance2);
-    Color sum(0);
-    const auto add = [&](std::uint32_t element) {
-      const FlatCell& flat = shape_.elements[element].flat;
-      const float facing = -glm::dot(flat.normal, towards);
-      if (facing > 0) sum += (flat.area * facing) * radiosity[element];
-    };
-    if (is_cluster(link.source)) {
-      const Cluster& c = shape_.clusters[cluster_index(link.source)];
-      for (std::uint32_t i = c.first; i < c.first + c.count; ++i) add(i);
-    } else {
-      add(link.source);
-    }
-    return {towards, sum * (kInvPi / std::max(distance2, sqr(shape_.radius(link.source))))};
-  }
-
-  /// What a link between elements brings without occlusion.
-  Color unoccluded(const Link& link, const std::vector<Color>& radiosity) const {
-    const Element& source = shape_.elements[link.source];
-    const float* f = link.factor;
-    if (source.leaf()) return (f[0] + f[1] + f[2] + f[3]) * radiosity[link.source];
-    const Color* quarter = &radiosity[source.children];
-    return f[0] * quarter[0] + f[1] * quarter[1] + f[2] * quarter[2] + f[3] * quarter[3];
-  }
-
-  /// Irradiance on each element that `radiosity` makes.
-  std::vector<Color> transport(const std::vector<Color>& radiosity) const {
-    // Links with clusters on their receiving side: once each, then by every face below.
-    const std::size_t base = first_of_cluster_[0];
-    std::vector<Flow> flows(links_.size() - base);
-    context_.workers().parallel_for(flows.size(), 64, [&](std::size_t i) {
-      flows[i] = flow(links_[base + i], radiosity);
-      flows[i].flow *= links_[base + i].visibility;
-    });
-    std::vector<Color> arriving(shape_.elements.size(), Color(0));
-    context_.workers().parallel_for(shape_.elements.size(), 256, [&](std::size_t i) {
-      const Element& element = shape_.elements[i];
-      const Vec3 n = element.flat.normal;
-      Color sum(0);
-      for (std::size_t l = first_of_element_[i]; l < first_of_element_[i + 1]; ++l) {
-        const Link& link = links_[l];
-        if (link.plain()) {
-          sum += link.visibility * unoccluded(link, radiosity);
-        } else {
-          const Flow f = flow(link, radiosity);
-          sum += link.visibility * std::max(0.0f, glm::dot(n, f.towards)) * f.flow;
-        }
-      }
-      if (element.parent == kNoNode) {
-        for (NodeRef c = shape_.faces[i].parent; c != kNoNode; c = shape_.clusters[cluster_index(c)].parent)
-          for (std::size_t l = first_of_cluster_[cluster_index(c)]; l < first_of_cluster_[cluster_index(c) + 1]; ++l)
-            sum += std::max(0.0f, glm::dot(n, flows[l - base].towards)) * flows[l - base].flow;
-      }
-      arriving[i] = sum;
-    });
-    for (std::size_t i = shape_.faces.size(); i < arriving.size(); ++i) arriving[i] += arriving[shape_.elements[i].parent];
-    return arriving;
-  }
+  // --- Solution -------------------------------------------------------------------------------------------------------------
 
   /// Irradiance on the leaves before any transport.
   std::vector<Color> sources() const {
@@ -470,7 +351,7 @@ class Solver {
   /// Form factors of a cell add up to 1 where its face sees nothing but surfaces, and nowhere to more.
   void correct_sums() {
     correction_.clear();
-    const std::vector<Color> sums = transport(std::vector<Color>(shape_.elements.size(), Color(1)));
+    const std::vector<Color> sums = links_.transport(context_.workers(), std::vector<Color>(shape_.elements.size(), Color(1)));
     for (const Color& sum : sums) correction_.push_back(correction(static_cast<std::uint32_t>(correction_.size()), sum.x));
   }
   float correction(std::uint32_t element, float sum) const {
@@ -487,7 +368,7 @@ class Solver {
     double before = 0, to_come = 0;
     for (std::int64_t i = 0; i < options_.iterations; ++i) {
       pull(irradiance, radiosity);
-      std::vector<Color> next = transport(radiosity);
+      std::vector<Color> next = links_.transport(context_.workers(), radiosity);
       double change = 0, size = 0;
       for (std::size_t k = 0; k < next.size(); ++k) {
         const Element& e = shape_.elements[k];
@@ -545,8 +426,8 @@ class Solver {
     std::vector<float> sums(links_.size());
     context_.workers().parallel_for(links_.size(), 64, [&](std::size_t l) {
       if (links_[l].plain()) return;
-      flows[l] = flow(links_[l], radiosity_);
-      sums[l] = flow(links_[l], one).flow.x;
+      flows[l] = links_.flow(links_[l], radiosity_);
+      sums[l] = links_.flow(links_[l], one).flow.x;
     });
     std::vector<Color> found(shape_.elements.size(), Color(0));
     context_.for_chunks(found.size(), 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
@@ -556,8 +437,9 @@ class Solver {
         if (!element.leaf() || !shape_.faces[element.face].receives) continue;
         const Receiver receiver(shape_, static_cast<std::uint32_t>(i));
         Gathered all;
-        const auto gather = [&](const std::vector<std::size_t>& first, std::size_t n) {
-          for (std::size_t l = first[n]; l < first[n + 1]; ++l) {
+        const auto gather = [&](NodeRef n) {
+          const Links::Range range = links_.to(n);
+          for (std::size_t l = range.first; l < range.end; ++l) {
             const Link& link = links_[l];
             Gathered g;
             if (link.plain())
@@ -569,9 +451,9 @@ class Solver {
             all.sum += g.sum;
           }
         };
-        for (std::uint32_t e = receiver.element; e != kNoNode; e = shape_.elements[e].parent) gather(first_of_element_, e);
+        for (std::uint32_t e = receiver.element; e != kNoNode; e = shape_.elements[e].parent) gather(e);
         for (NodeRef c = shape_.faces[element.face].parent; c != kNoNode; c = shape_.clusters[cluster_index(c)].parent)
-          gather(first_of_cluster_, cluster_index(c));
+          gather(c);
         found[i] = correction(receiver.element, all.sum) * all.E;
       }
     });
@@ -700,8 +582,7 @@ class Solver {
   Hierarchy shape_;
   std::shared_ptr<const Patches> patches_;
 
-  std::vector<Link> links_;  // those of elements first, in order of receivers
-  std::vector<std::size_t> first_of_element_, first_of_cluster_;
+  Links links_;
   std::vector<Color> radiosity_, irradiance_;  // by element; irradiance: all of it, that of the input too
   std::vector<float> correction_;              // by element, of what links bring
   std::vector<float> spread_;                  // by element: how much its leaves' radiosity differs from its own

@@ -5,31 +5,9 @@
 #include <numeric>
 
 #include "ln/diffuse_surface.hpp"
+#include "ln/disjoint_sets.hpp"
 
 namespace ln::radiosity {
-
-namespace {
-
-/// Sets that are joined, each known by its smallest member.
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
-
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::uint32_t i, std::uint32_t j) {
-    i = find(i);
-    j = find(j);
-    parent_[std::max(i, j)] = std::min(i, j);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
-
-}  // namespace
 
 Hierarchy::Hierarchy(PrepareContext& context, NodeId node, const QuadTree& in, const RadiosityOptions& options)
     : context_(context), patches_(in.patches()), smallest_area_(4 * sqr(options.smallest > 0 ? options.smallest : 1.0f / 128)) {

@@ -21,6 +21,7 @@ network tapped_light
 tag none = node "nowhere"
 light   = Lights()
 photons = ParticleTracer(light, count = 50k, via = ())
+kd_tree = KDPhotonTree(photons)
 sorted  = PhotonSurfSort(photons)
 direct  = Direct(light)
 cells   = PointsToQuadTree(direct, error = 0.2%)
@@ -28,6 +29,11 @@ smooth  = QuadTreeToTriMesh(cells)
 records = IGCache(IGSampler(PathTracer(direct, via = D), samples = 256))
 tap photons -> "photons.ply"
 tap photons -> "photons.csv"
+tap light   -> "light.ply"
+tap light   -> "light.csv"
+tap kd_tree -> "kd_tree.ply"
+tap kd_tree -> "kd_tree.csv"
+tap Lights(from = none) -> "no_light.ply"
 tap sorted  -> "sorted.ply"
 tap sorted  -> "sorted.csv"
 tap cells   -> "cells.glb"
@@ -134,6 +140,19 @@ def test_files_hold_the_light(compiled_network, run_program, tmp_path):
 
     assert_csv(tmp_path / "photons.csv", photons, COLUMNS)
 
+    light = read_ply(tmp_path / "light.ply")
+    assert_csv(tmp_path / "light.csv", light, [*COLUMNS[:3], "w_x", "w_y", "w_z", *COLUMNS[9:], "delta"])
+    power = [light[f"flux_{c}"].sum(dtype=float) for c in "rgb"]
+    np.testing.assert_allclose(power, 4 * math.pi * known.POINT_INTENSITY * np.array(known.POINT_COLOR), rtol=1e-3)
+    np.testing.assert_allclose(vectors(light, "x", "y", "z"), [known.POINT_POSITION] * len(light), atol=1e-5)
+    np.testing.assert_allclose(vectors(light, "w_x", "w_y", "w_z").mean(axis=0), 0, atol=1e-2)
+    assert (light["delta"] == 1).all()
+
+    kd_tree = read_ply(tmp_path / "kd_tree.ply")
+    assert_csv(tmp_path / "kd_tree.csv", kd_tree, [*COLUMNS[:6], *COLUMNS[9:]])
+    for name in [*COLUMNS[:6], *COLUMNS[9:]]:
+        np.testing.assert_array_equal(np.sort(kd_tree[name]), np.sort(photons[name]))
+
     for name in ("cells", "smooth"):
         model, meshes = read_glb(tmp_path / f"{name}.glb")
         assert list(meshes) == ["front"]
@@ -146,13 +165,13 @@ def test_files_hold_the_light(compiled_network, run_program, tmp_path):
         np.testing.assert_allclose(mesh["corners"][..., 1], 0, atol=1e-5)
 
     before = {path.name: path.read_bytes() for path in tmp_path.glob("*.[pcg]*") if path.suffix != ".exr"}
-    assert len(before) == 11
+    assert len(before) == 16
     run_program(program, SCENES / "plane_point.gltf", *SMALL, "--threads", "1")
     for name, content in before.items():
         assert (tmp_path / name).read_bytes() == content, name
 
     # What carries no light gives empty files.
-    assert len(read_ply(tmp_path / "no_photons.ply")) == 0
+    assert len(read_ply(tmp_path / "no_photons.ply")) == len(read_ply(tmp_path / "no_light.ply")) == 0
     assert (tmp_path / "no_photons.csv").read_text() == ",".join(COLUMNS) + "\n"
     assert "no_cells.glb: nothing on this wire is lit" in run.stderr
     assert not read_glb(tmp_path / "no_cells.glb")[1]

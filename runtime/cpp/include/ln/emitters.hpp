@@ -156,4 +156,8 @@ class Emitters {
   Color total_power_{0};
 };
 
+struct TapFile;
+/// Particles that leave the emitters, picked by power. Formats: .ply, .csv.
+void write_tap(const TapFile& tap, const Emitters& emitters);
+
 }  // namespace ln

@@ -86,4 +86,8 @@ class PhotonMap {
   std::vector<Node> nodes_;  // [m]: between blocks m-1 and m; the node of blocks [b, e) is (b + e) / 2
 };
 
+struct TapFile;
+/// Points with normals and flux. Formats: .ply, .csv.
+void write_tap(const TapFile& tap, const PhotonMap& map);
+
 }  // namespace ln

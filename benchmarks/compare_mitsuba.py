@@ -1,7 +1,7 @@
 """Compare a compiled network with Mitsuba 3's path tracer on the same glTF file, in time, error and picture.
 
     lnc compile examples/path_tracing.ln -o network
-    python -m benchmarks.compare_mitsuba ./network examples/scenes/cornell_box.gltf --cache /tmp/references
+    python -m benchmarks.compare_mitsuba ./network examples/scenes/cornell_box.gltf --cache references
 
 Both render at the same size, with the same samples per pixel and number of threads, in turn, `--repeats` times with
 different seeds; the table holds medians. Ours is timed by its own clock (prepare + render of --stats), Mitsuba by the

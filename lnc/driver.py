@@ -106,7 +106,7 @@ def compile_network(source: SourceFile, library: Library, dump: Dump | None = No
     reporter = Reporter()
     file = parse(source, reporter)
     _dump_text(dump, "parse", file)
-    expanded = expand_macros(file, set(library.operators), _read_used, reporter)
+    expanded = expand_macros(file, library, _read_used, reporter)
     file = expanded.file
     _dump_text(dump, "expand_macros", file)
     network = resolve(file, _default_name(source.name), library, reporter, expanded.broken | file.broken)
@@ -207,9 +207,8 @@ def _with_calls(diagnostics: list[Diagnostic], calls: dict[Span, Span]) -> list[
     """A mistake inside a macro is also shown where the macro is called."""
     shown: list[Diagnostic] = []
     for diagnostic in diagnostics:
-        span = diagnostic.span
         for macro, call in calls.items():
-            if macro.source is span.source and macro.start <= span.start < macro.end:
+            if macro.holds(diagnostic.span):
                 called = Related(call, "in this call of the macro")
                 diagnostic = replace(diagnostic, related=(*diagnostic.related, called))
         shown.append(diagnostic)

@@ -70,7 +70,6 @@ class Node:
     origin: str
     span: Span = field(compare=False, repr=False)  # of the expression
     statement: Span = field(compare=False, repr=False)
-    annotation: str | None = None
     reason: str = ""
 
     def input(self, port: str) -> Input | None:

@@ -93,3 +93,11 @@ def test_carets_stand_under_the_text() -> None:
     assert lines[4].index("^") == lines[3].index("form")
     assert lines[4].count("^") == len("form")
     assert lines[5] == "help: did you mean 'from'?"
+
+
+def test_a_wrong_value_for_a_macro_is_shown_at_both_places(library: Library) -> None:
+    macro = "op Lit(light: Emission, rays = 1) -> Points {\n    out = Direct(light, samples = rays)\n}\n"
+    source = SourceFile("macro.ln", f"{macro}image Lit(Lights(), rays = -1)\n")
+    (found,) = compile_network(source, library).diagnostics
+    assert (found.code, found.span.text) == ("LN0104", "-1")
+    assert [related.span.text for related in found.related] == ["samples = rays"]

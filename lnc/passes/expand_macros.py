@@ -15,7 +15,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from lnc.diagnostics import Related, Reporter, did_you_mean, quote
+from lnc.library import POINTS, Library, snake_case
 from lnc.naming import Names
+from lnc.passes.resolve import report_unknown_representation
 from lnc.source import SourceFile, Span
 from lnc.syntax import ast
 from lnc.syntax.parse import parse
@@ -37,21 +39,20 @@ class Expanded:
     broken: frozenset[str] = frozenset()  # wires whose macro call was wrong, which has been reported
 
 
-def expand_macros(file: ast.File, operators: set[str], read: Read, reporter: Reporter) -> Expanded:
+def expand_macros(file: ast.File, library: Library, read: Read, reporter: Reporter) -> Expanded:
     """The file with every macro call replaced by the macro's equations."""
     if not any(isinstance(s, ast.Macro | ast.Use) for s in file.statements):
         return Expanded(file)
-    macros = _Macros(operators, read, reporter)
+    macros = _Macros(library, read, reporter)
     macros.collect(file)
-    known = operators if macros.unread else None
-    return _Expander(macros.found, file.broken | macros.broken, known, reporter).run(file)
+    return _Expander(macros, file, library, reporter).run()
 
 
 class _Macros:
     """All macros of a file and of the files it uses."""
 
-    def __init__(self, operators: set[str], read: Read, reporter: Reporter) -> None:
-        self.operators = operators
+    def __init__(self, library: Library, read: Read, reporter: Reporter) -> None:
+        self.library = library
         self.read = read
         self.reporter = reporter
         self.found: dict[str, ast.Macro] = {}
@@ -91,7 +92,7 @@ class _Macros:
         return file
 
     def _add(self, macro: ast.Macro) -> None:
-        if macro.name in self.found or macro.name in self.operators:
+        if macro.name in self.found or macro.name in self.library.operators:
             first = self.found.get(macro.name)
             related = [Related(first.name_span, "first here")] if first else []
             message = f"the operator {quote(macro.name)} is defined twice"
@@ -103,6 +104,10 @@ class _Macros:
             if name in names:
                 self.reporter.error("LN0106", span, f"{quote(name)} is defined twice in this macro")
             names.add(name)
+        declared = [(i.representation, i.span) for i in macro.inputs] + [(macro.output, macro.name_span)]
+        for representation, span in declared:
+            if representation is not None and representation not in self.library.representations:
+                report_unknown_representation(representation, self.library, span, self.reporter)
         if all(e.name != RESULT for e in macro.body):
             message = f"the macro {quote(macro.name)} has no result"
             self.reporter.error("LN0111", macro.name_span, message, help=f"add an equation: {RESULT} = ...")
@@ -118,40 +123,42 @@ class _Instance:
     macro: ast.Macro | None
 
 
-class _Expander:
-    """`operators`: all names of operators, if a macro of any other name may be missing; else None."""
+_OUTSIDE = _Instance({}, {}, (), None)
+"""Where the statements of the file stand, in no macro."""
 
-    def __init__(
-        self, macros: dict[str, ast.Macro], broken: frozenset[str], operators: set[str] | None, reporter: Reporter
-    ) -> None:
-        self.macros = macros
-        self.operators = operators
+
+class _Expander:
+    def __init__(self, macros: _Macros, file: ast.File, library: Library, reporter: Reporter) -> None:
+        self.macros = macros.found
+        self.unread = macros.unread
+        self.file = file
+        self.library = library
         self.reporter = reporter
-        self.names = Names(())
+        self.equations = {s.name: s for s in file.statements if isinstance(s, ast.Equation)}
+        self.names = Names(self.equations)
         self.calls: dict[Span, Span] = {}
-        self.broken = set(broken)
+        self.converted: dict[tuple[str, str], str] = {}  # a wire and what inputs of macros want -> its conversion
+        self.broken = set(file.broken | macros.broken)
         self.pending: list[tuple[ast.Equation, _Instance]] = []
         self.count = 0
 
-    def run(self, file: ast.File) -> Expanded:
-        outside = _Instance({}, {}, (), None)
-        self.names = Names(s.name for s in file.statements if isinstance(s, ast.Equation))
+    def run(self) -> Expanded:
         statements: list[ast.Statement] = []
-        for statement in file.statements:
+        for statement in self.file.statements:
             match statement:
                 case ast.Macro() | ast.Use():
                     continue
                 case ast.Equation():
-                    self.pending.append((statement, outside))
+                    self.pending.append((statement, _OUTSIDE))
                 case ast.ImageStatement() | ast.TapStatement() | ast.LightmapStatement() | ast.ProbeStatement():
                     home = statement.span.text.split(maxsplit=1)[0]
-                    statements.append(statement.changed(wire=self._wire(statement.wire, home, outside)))
+                    statements.append(statement.changed(wire=self._wire(statement.wire, home, _OUTSIDE)))
                 case _:
                     statements.append(statement)
             while self.pending:
                 equation, instance = self.pending.pop()
                 statements += self._equation(equation, instance)
-        return Expanded(file.changed(statements=tuple(statements)), self.calls, frozenset(self.broken))
+        return Expanded(self.file.changed(statements=tuple(statements)), self.calls, frozenset(self.broken))
 
     def _equation(self, equation: ast.Equation, instance: _Instance) -> list[ast.Statement]:
         """The equation without macro calls in it; equations of the macros it calls become pending."""
@@ -178,7 +185,7 @@ class _Expander:
                 given = self._arguments(arguments, instance)
                 return wire.changed(wire=self._wire(inner, home, instance), arguments=given)
         if wire.op not in self.macros:
-            if self.operators is not None and wire.op not in self.operators:
+            if self.unread and wire.op not in self.library.operators:  # it may stand in that file
                 self.broken.add(wire.op)
             inputs = tuple(self._wire(w, home, instance) for w in wire.inputs)
             return wire.changed(inputs=inputs, arguments=self._arguments(wire.arguments, instance))
@@ -246,9 +253,21 @@ class _Expander:
             target = wires[inner.name]
             assert isinstance(target, ast.WireName)
             fresh = inner.changed(name=target.name, comments=ast.Comments())
-            if inner.name == RESULT and equation is not None:
-                fresh = fresh.changed(comments=equation.comments, representation=equation.representation)
+            if inner.name == RESULT:
+                fresh = fresh.changed(representation=self._checked_as(macro, inner, equation))
+                if equation is not None:
+                    fresh = fresh.changed(comments=equation.comments)
             self.pending.append((fresh, inside))
+
+    def _checked_as(self, macro: ast.Macro, out: ast.Equation, equation: ast.Equation | None) -> str | None:
+        """What the result of a call is checked to be: the macro's output. `out: R` and `x: R = Macro(...)` are to agree."""
+        for annotated in (out, equation):
+            if annotated is not None and annotated.representation not in (None, macro.output):
+                what = f"{quote(annotated.name_span.text)} is to be {annotated.representation}"
+                declared = Related(macro.name_span, f"{quote(macro.name)} is declared here")
+                message = f"{what}, but {quote(macro.name)} gives {macro.output}"
+                self.reporter.error("LN0201", annotated.wire.span, message, related=[declared])
+        return macro.output if macro.output in self.library.representations else None
 
     def _bind_wires(
         self,
@@ -262,29 +281,79 @@ class _Expander:
         if len(call.inputs) > len(ports):
             message = f"{quote(macro.name)} takes {len(ports)} wire{'s' if len(ports) != 1 else ''}"
             self.reporter.error("LN0107", call.inputs[len(ports)].span, message)
-        given = [(p.name, self._wire(w, name, instance)) for p, w in zip(ports, call.inputs, strict=False)]
-        port_names = {p.name for p in ports}
-        for argument in self._arguments(call.arguments, instance):
-            if argument.name in port_names and isinstance(argument.value, ast.NameValue):
-                given.append((argument.name, ast.WireName(argument.value.name, argument.value.span)))
-        for port, wire in given:
-            if port in wires:
-                self.reporter.error("LN0107", wire.span, f"the input {quote(port)} is given twice")
+        given = [
+            (port, self._wire(wire, name, instance), self._representation(wire, instance))
+            for port, wire in zip(ports, call.inputs, strict=False)
+        ]
+        named = {port.name: port for port in ports}
+        for argument, replaced in zip(call.arguments, self._arguments(call.arguments, instance), strict=True):
+            if argument.name not in named:
+                continue
+            port, value = named[argument.name], argument.value
+            if not isinstance(value, ast.NameValue) or not isinstance(replaced.value, ast.NameValue):
+                message = f"{quote(port.name)} is an input: by name it takes a single wire"
+                self.reporter.error("LN0104", value.span, message)
+                wires[port.name] = ast.WireName(port.name, call.span)
+                self.broken.add(port.name)
+                continue
+            found = self._representation(ast.WireName(value.name, value.span), instance)
+            given.append((port, ast.WireName(replaced.value.name, replaced.value.span), found))
+        for port, wire, found in given:
+            if port.name in wires:
+                self.reporter.error("LN0107", wire.span, f"the input {quote(port.name)} is given twice")
                 continue
             if not isinstance(wire, ast.WireName):  # computed once, however often the macro reads it
-                held = self.names.free(f"{name}_{port}")
-                self.pending.append(
-                    (ast.Equation(held, None, wire, ast.Comments(), wire.span, wire.span), _Instance({}, {}, (), None))
-                )
+                held = self.names.free(f"{name}_{port.name}")
+                self.pending.append((ast.Equation(held, None, wire, ast.Comments(), wire.span, wire.span), _OUTSIDE))
                 wire = ast.WireName(held, wire.span)
-            wires[port] = wire
+            wires[port.name] = self._converted(wire, port, macro, found)
+
+    def _converted(self, wire: ast.WireName, port: ast.MacroInput, macro: ast.Macro, found: str | None) -> ast.WireName:
+        """The wire as the input of a macro takes it: converted where it is something else, once for all macros."""
+        wanted = port.representation
+        if wanted not in self.library.representations or found is None or found == wanted:
+            return wire
+        key = (wire.name, wanted)
+        if key not in self.converted:
+            name = self.converted[key] = self.names.free(f"{wire.name}_{snake_case(wanted)}")
+            cast = ast.Cast(wire, wanted, (), wire.span, port.span, macro.name)
+            equation = ast.Equation(name, None, cast, ast.Comments(), wire.span, wire.span)
+            self.pending.append((equation, _OUTSIDE))
+        return ast.WireName(self.converted[key], wire.span)
+
+    def _representation(self, wire: ast.WireExpression, instance: _Instance) -> str | None:
+        """What an expression is, as far as its text says; None if that is wrong, which is reported elsewhere."""
+        seen: set[str] = set()
+        while isinstance(wire, ast.WireName):
+            for port in instance.macro.inputs if instance.macro else ():
+                if port.name == wire.name:
+                    return port.representation
+            equations = {e.name: e for e in instance.macro.body} if instance.macro else self.equations
+            if wire.name in seen or wire.name not in equations:
+                return None
+            seen.add(wire.name)
+            wire = equations[wire.name].wire
+        match wire:
+            case ast.Call(op) if op in self.macros:
+                return self.macros[op].output
+            case ast.Call(op):
+                return self.library.operators[op].output if op in self.library.operators else None
+            case ast.Cast(_, representation):
+                return representation
+        return POINTS
 
     def _bind_values(self, call: ast.Call, macro: ast.Macro, instance: _Instance, values: dict[str, ast.Value]) -> None:
         known = {i.name for i in macro.inputs}
+        given: dict[str, Span] = {}
         for port in macro.inputs:
             if port.default is not None:
                 values[port.name] = port.default
         for argument in self._arguments(call.arguments, instance):
+            if argument.name in given and argument.name in values:
+                message = f"the parameter {quote(argument.name)} is given twice"
+                first = Related(given[argument.name], "first here")
+                self.reporter.error("LN0107", argument.span, message, related=[first])
+            given.setdefault(argument.name, argument.span)
             if argument.name not in known:
                 message = f"{quote(macro.name)} has no parameter {quote(argument.name)}"
                 help = did_you_mean(argument.name, known)

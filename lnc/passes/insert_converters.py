@@ -39,6 +39,9 @@ class _Inserter:
         self.names = Names(node.name for node in typed.network.nodes)
         self.shared: dict[tuple[tuple[tuple[str, float], ...], str], str] = {}
         self.definitions = {node.name: node for node in typed.network.nodes}
+        for node in typed.network.nodes:
+            if node.origin == "converter":  # for an input of a macro
+                self.shared[((node.inputs[0].terms[0].node, 1.0),), node.op.output] = node.name
 
     def run(self) -> TypedNetwork:
         network = self.typed.network
@@ -101,19 +104,18 @@ class _Inserter:
         found = self.representations.get(term.node)
         if found is None or found == wanted:
             return term
-        key = (((term.node, 1.0),), wanted)
-        if key in self.shared:
-            return replace(term, node=self.shared[key])
         chains = cheapest_chains(self.library, found, wanted)
         if len(chains) != 1:
             self._report(term, found, wanted, reason, chains, declared)
             return term
         name = term.node
         for op in chains[0]:
-            source = Input(op.ports[0], (Term(name, 1.0, term.span),), term.span)
-            why = f"{reason}, '{term.node}' is {found}"
-            name = self._add(f"{term.node}_{_last_word(op)}", op, source, why, term.span, statement)
-        self.shared[key] = name
+            key = (((name, 1.0),), op.output)
+            if key not in self.shared:
+                source = Input(op.ports[0], (Term(name, 1.0, term.span),), term.span)
+                why = f"{reason}, '{term.node}' is {found}"
+                self.shared[key] = self._add(f"{term.node}_{_last_word(op)}", op, source, why, term.span, statement)
+            name = self.shared[key]
         return replace(term, node=name)
 
     def _sum(self, terms: tuple[Term, ...], reason: str, consumer: Node, span: Span) -> str:
@@ -130,7 +132,7 @@ class _Inserter:
         self.representations[free] = op.output
         defaults = [parameter_value(p, None, (), self.reporter) for p in op.parameters]
         parameters: tuple[ParameterValue, ...] = tuple(v for v in defaults if v is not None)
-        self.nodes.append(Node(free, op, (source,), parameters, "converter", span, statement, None, reason))
+        self.nodes.append(Node(free, op, (source,), parameters, "converter", span, statement, reason))
         return free
 
     def _report(

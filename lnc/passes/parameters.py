@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator
 from functools import lru_cache
 
-from lnc.diagnostics import Reporter, did_you_mean, quote
+from lnc.diagnostics import Related, Reporter, did_you_mean, quote
 from lnc.library import Parameter, Scalar
 from lnc.network import ParameterValue, PathValue
 from lnc.paths.automaton import STATE_LIMIT, Dfa, EventTable, TooLarge
@@ -35,10 +35,11 @@ def parameter_value(
     tags: Collection[str],
     reporter: Reporter,
     broken: frozenset[str] = frozenset(),
+    place: Span | None = None,
 ) -> ParameterValue | None:
     """The parameter with `value`, or with its default where that is None; None if it is wrong and reported.
 
-    Tags in `broken` have been reported where they are defined.
+    Tags in `broken` have been reported where they are defined. `place`: where a macro hands the value on to an operator.
     """
     if value is None:
         if parameter.type == "path" and parameter.default is not None:
@@ -49,7 +50,8 @@ def parameter_value(
     except ValueFault as fault:
         if str(fault):
             help = did_you_mean(value.name, parameter.choices) if isinstance(value, ast.NameValue) else None
-            reporter.error("LN0104", value.span, f"'{parameter.name}': {fault}", help=help)
+            related = [Related(place, "inside of the macro it is used here")] if place else []
+            reporter.error("LN0104", value.span, f"'{parameter.name}': {fault}", related=related, help=help)
         return None
 
 

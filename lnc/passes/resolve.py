@@ -55,6 +55,11 @@ def define_tags(statements: Iterable[ast.Statement], reporter: Reporter) -> dict
     return tags
 
 
+def report_unknown_representation(name: str, library: Library, span: Span, reporter: Reporter) -> None:
+    help = did_you_mean(name, library.representations)
+    reporter.error("LN0102", span, f"no representation is called {quote(name)}", help=help)
+
+
 @dataclass(frozen=True)
 class _Home:
     """Where an expression stands: the name that calls inside it derive theirs from, and the statement."""
@@ -179,12 +184,11 @@ class _Resolver:
                     self.names.free(statement.name)
 
     def _equation(self, equation: ast.Equation) -> None:
-        if equation.representation is not None and equation.representation not in self.library.representations:
-            self._unknown_representation(equation.representation, equation.name_span)
+        self._check_annotation(equation)
         home = _Home(equation.name, equation.span)
         match equation.wire:
             case ast.Call() as call:
-                self._call(call, equation.name, "equation", home, equation.representation)
+                self._call(call, equation.name, "equation", home)
             case ast.Cast() as cast:
                 self._cast(cast, equation.name, home)
             case ast.WireSum() as wire:
@@ -192,9 +196,27 @@ class _Resolver:
                 sum_op = self.library.operators["Sum"]
                 if terms is not None:
                     inputs = (Input(sum_op.ports[0], terms, wire.span),)
-                    self._add(equation.name, sum_op, inputs, (), "equation", home, wire.span, equation.representation)
+                    self._add(equation.name, sum_op, inputs, (), "equation", home, wire.span)
             case ast.WireName():
                 self._alias(equation)
+
+    def _check_annotation(self, equation: ast.Equation) -> None:
+        wanted = equation.representation
+        if wanted is None:
+            return
+        if wanted not in self.library.representations:
+            report_unknown_representation(wanted, self.library, equation.name_span, self.reporter)
+            return
+        found = self._representation(equation.wire)
+        if found is None or found == wanted:
+            return
+        what, related = f"this is {found}", []
+        if isinstance(equation.wire, ast.Call):
+            op = self.library.operators[equation.wire.op]
+            what, related = f"'{op.name}' gives {found}", [_declared_here(op, op.span)]
+        message = f"{quote(equation.name_span.text)} is to be {wanted}, but {what}"
+        help = f"to convert it, write: ... as {wanted}"
+        self.reporter.error("LN0201", equation.wire.span, message, related=related, help=help)
 
     def _alias(self, equation: ast.Equation) -> None:
         """A second name for a wire: no node, but its end must exist and must not be itself."""
@@ -274,7 +296,7 @@ class _Resolver:
 
     # --- Calls --------------------------------------------------------------------------------------------------------
 
-    def _call(self, call: ast.Call, name: str, origin: str, home: _Home, annotation: str | None = None) -> None:
+    def _call(self, call: ast.Call, name: str, origin: str, home: _Home) -> None:
         op = self._operator(call)
         if op is None:
             self._unknown_operator(call)
@@ -284,7 +306,7 @@ class _Resolver:
         inputs = self._inputs(call, op, home if origin == "equation" else _Home(name, home.statement))
         parameters = self._parameters(call, op)
         if inputs is not None and parameters is not None:
-            self._add(name, op, inputs, parameters, origin, home, call.span, annotation)
+            self._add(name, op, inputs, parameters, origin, home, call.span)
 
     def _operator(self, call: ast.Call) -> Operator | None:
         """The operator that a name stands for: of its overloads the one whose inputs take the least conversion."""
@@ -411,7 +433,9 @@ class _Resolver:
             message = f"'{call.op}' needs its parameter '{parameter.name}: {parameter.type}'"
             self.reporter.error("LN0105", call.span, message)
             return None
-        return parameter_value(parameter, argument.value if argument else None, self.tags, self.reporter, self.broken)
+        value = argument.value if argument else None
+        place = argument.span if argument and not argument.span.holds(argument.value.span) else None
+        return parameter_value(parameter, value, self.tags, self.reporter, self.broken, place)
 
     # --- Conversions that are asked for -------------------------------------------------------------------------------
 
@@ -419,7 +443,7 @@ class _Resolver:
         """`wire as Representation(...)`: the cheapest chain, its last node called `name` if there is one."""
         terms = self._wire(cast.wire, home)
         if cast.representation not in self.library.representations:
-            self._unknown_representation(cast.representation, cast.representation_span)
+            report_unknown_representation(cast.representation, self.library, cast.representation_span, self.reporter)
             return None
         found = self._representation(cast.wire)
         if terms is None or found is None:
@@ -439,6 +463,9 @@ class _Resolver:
                 help = did_you_mean(argument.name, accepted)
                 self.reporter.error("LN0103", argument.name_span, message, help=help)
                 return None
+        reason = ""
+        if cast.macro is not None:
+            reason = f"'{cast.macro}' takes {cast.representation}, '{terms[0].node}' is {found}"
         for op in chains[0]:
             arguments = tuple(a for a in cast.arguments if op.parameter(a.name))
             parameters = self._parameters(ast.Call(op.name, (), arguments, cast.span, cast.span), op)
@@ -446,21 +473,25 @@ class _Resolver:
                 return None
             last = op is chains[0][-1]
             node = name if last and name else self.names.derived(home.name, op.name)
-            origin = "equation" if last and name else "nested"
-            self._add(node, op, (Input(op.ports[0], terms, cast.wire.span),), parameters, origin, home, cast.span)
+            origin = "converter" if reason else "equation" if last and name else "nested"
+            inputs = (Input(op.ports[0], terms, cast.wire.span),)
+            self._add(node, op, inputs, parameters, origin, home, cast.span, reason)
             terms = (Term(node, 1.0, cast.span),)
         return terms
 
     def _no_single_chain(
         self, cast: ast.Cast, found: str, chains: list[tuple[Operator, ...]]
     ) -> tuple[Term, ...] | None:
+        wanted = f"'{cast.macro}' takes {cast.representation}, this is {found}: " if cast.macro else ""
+        related = [Related(cast.representation_span, "declared here")] if cast.macro else []
         if not chains:
-            message = f"no converter leads from {found} to {cast.representation}"
-            self.reporter.error("LN0201", cast.span, message)
+            message = f"{wanted}no converter leads from {found} to {cast.representation}"
+            self.reporter.error("LN0201", cast.span, message, related=related)
         elif len(chains) > 1:
             listed = ", ".join(" then ".join(op.name for op in chain) for chain in chains)
-            message = f"several conversions from {found} to {cast.representation} cost the same: {listed}"
-            self.reporter.error("LN0202", cast.span, message, help="write the one you want as a call")
+            message = f"{wanted}several conversions from {found} to {cast.representation} cost the same: {listed}"
+            help = "write the one you want as a call"
+            self.reporter.error("LN0202", cast.span, message, related=related, help=help)
         else:
             message = f"this is {found} already"
             self.reporter.error("LN0201", cast.span, message, help="remove the conversion")
@@ -491,17 +522,13 @@ class _Resolver:
         origin: str,
         home: _Home,
         span: Span,
-        annotation: str | None = None,
+        reason: str = "",
     ) -> None:
         if not parameters:
             defaults = [parameter_value(p, None, self.tags, self.reporter) for p in op.parameters]
             parameters = tuple(v for v in defaults if v is not None)
         self.made.add(name)
-        self.nodes.append(Node(name, op, inputs, parameters, origin, span, home.statement, annotation))
-
-    def _unknown_representation(self, name: str, span: Span) -> None:
-        help = did_you_mean(name, self.library.representations)
-        self.reporter.error("LN0102", span, f"no representation is called {quote(name)}", help=help)
+        self.nodes.append(Node(name, op, inputs, parameters, origin, span, home.statement, reason))
 
     def _check_layers(self, image: Image | None) -> None:
         """No two layers of the picture may have one name."""

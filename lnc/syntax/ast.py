@@ -160,13 +160,17 @@ class Call(Record):
 
 
 class Cast(Record):
-    """`wire as QuadTree(error = 1%)`: converts here, with these parameters."""
+    """`wire as QuadTree(error = 1%)`: converts here, with these parameters.
+
+    `macro`: not written, but wanted by an input of the macro of this name; counts as inserted.
+    """
 
     wire: WireExpression
     representation: str
     arguments: tuple[Argument, ...]
     span: Span
     representation_span: Span
+    macro: str | None = None
 
 
 class SumTerm(Record):

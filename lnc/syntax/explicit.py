@@ -18,8 +18,9 @@ def explicit(file: ast.File, network: Network) -> str:
     """The text of `file` with an equation for each node of `network`, added ones before the statement they serve."""
     added: dict[Span, list[Node]] = {}
     nodes = network.by_name()
+    written = {statement.name for statement in file.statements if isinstance(statement, ast.Equation)}
     for node in network.nodes:
-        if node.origin != "equation":
+        if node.name not in written:
             added.setdefault(node.statement, []).append(node)
     statements: list[ast.Statement] = []
     taps, probes, lightmaps = iter(network.taps), iter(network.probes), iter(network.lightmaps)

@@ -260,7 +260,7 @@ class _Expander:
             self.pending.append((fresh, inside))
 
     def _checked_as(self, macro: ast.Macro, out: ast.Equation, equation: ast.Equation | None) -> str | None:
-        """What the result of a call is checked to be: the macro's output. `out: R` and `x: R = Macro(...)` are to agree."""
+        """What the result of a call is checked for: the macro's output. `out: R`, `x: R = Macro(...)` are to agree."""
         for annotated in (out, equation):
             if annotated is not None and annotated.representation not in (None, macro.output):
                 what = f"{quote(annotated.name_span.text)} is to be {annotated.representation}"

@@ -39,7 +39,7 @@ def parameter_value(
 ) -> ParameterValue | None:
     """The parameter with `value`, or with its default where that is None; None if it is wrong and reported.
 
-    Tags in `broken` have been reported where they are defined. `place`: where a macro hands the value on to an operator.
+    Tags in `broken` have been reported where they are defined. `place`: where a macro hands the value on.
     """
     if value is None:
         if parameter.type == "path" and parameter.default is not None:

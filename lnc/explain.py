@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from lnc.diagnostics.codes import Page
 from lnc.diagnostics.format import printable
 from lnc.driver import Result, describe_paths
-from lnc.library import Library, Operator, Parameter
+from lnc.library import Library, Operator, Parameter, first_sentence
 from lnc.network import Node, PathReport, ScheduledNode, TypedNetwork
 from lnc.syntax.ast import TagRef
 
@@ -113,10 +113,10 @@ def _tags(node: Node) -> list[str]:
 def list_operators(library: Library) -> str:
     rows = [("operator", "from -> to", "what it is")]
     for op in sorted(library.operators.values(), key=lambda o: (o.family, o.name)):
-        rows.append((op.name, _signature(op), op.doc.split("\n")[0]))
+        rows.append((op.name, _signature(op), first_sentence(op.doc)))
     rows.append(("", "", ""))
     for representation in library.representations.values():
-        rows.append((representation.name, "representation", representation.doc.split("\n")[0]))
+        rows.append((representation.name, "representation", first_sentence(representation.doc)))
     return "\n".join(_table(rows)) + "\n"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -149,6 +150,12 @@ class Library:
             if op.overloads is not None:
                 found.setdefault(op.overloads, []).append(op)
         return {name: tuple(ops) for name, ops in found.items()}
+
+
+def first_sentence(doc: str) -> str:
+    """What a list shows of a documentation, on one line."""
+    paragraph = " ".join(doc.strip().split("\n\n")[0].split())
+    return re.split(r"(?<=\.) (?=[A-Z0-9])", paragraph, maxsplit=1)[0]
 
 
 def snake_case(name: str) -> str:

@@ -150,6 +150,7 @@ def test_ops(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["ops"]) == 0
     listed = capsys.readouterr().out
     assert "NNDensity" in listed and "PhotonMap -> Points" in listed
+    assert all(line.endswith(".") for line in listed.splitlines()[1:] if line), "what is listed are whole sentences"
     assert main(["ops", "NNDensity"]) == 0
     assert "neighbours: count = 60" in capsys.readouterr().out
 

@@ -12,7 +12,7 @@ from lnc.codegen.languages import TagRuleView, tag_rules
 from lnc.codegen.names import cpp_string, float_literal, unique_names
 from lnc.codegen.wires import PathTable, WireView, wire_views
 from lnc.diagnostics import InternalError
-from lnc.library import POINTS, snake_case
+from lnc.library import POINTS, first_sentence, snake_case
 from lnc.network import Lightmap, ParameterValue, PathValue, Probe, Schedule, ScheduledInput, ScheduledNode, Tap, Term
 from lnc.passes.conditions import Formula, holds
 from lnc.paths.language import EMITTERS, EVENTS, Alphabet
@@ -630,7 +630,7 @@ class _Builder:
                     high=_bound(d.high, ""),
                     choices=d.choices if d.type == "choice" else (),
                     choices_name=f"{member}_{d.name}_choices",
-                    summary=d.doc.strip().split("\n")[0],
+                    summary=first_sentence(d.doc),
                 )
             )
         return found

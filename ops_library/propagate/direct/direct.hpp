@@ -25,20 +25,29 @@ struct Direct {
   /// Emitters chosen by their importance for the point; area emitters share their light with the BSDF's sample.
   template <class Request>
   LN_INLINE Color sample_emitters(Request& request, const Emitters& light) const {
+    return samples == 1 ? sample_emitter(request, light, 0, 1) : sample_several(request, light);
+  }
+
+  template <class Request>
+  LN_NOINLINE Color sample_several(Request& request, const Emitters& light) const {
     const auto n = static_cast<std::uint32_t>(samples);
     Color sum(0);
-    for (std::uint32_t j = 0; j < n; ++j) {
-      const float pick = light.size() == 1 ? 0 : request.random().get1(request.depth(), own(kPick), j, n);
-      const Vec2 position = request.random().get2(request.depth(), own(kPosition), j, n);
-      const LightSample s = light.sample(request.at().at, request.emitter_side(), pick, position);
-      if (!(s.pdf_w > 0) || is_black(s.radiance)) continue;
-      const BsdfValue bsdf = request.evaluate(s.wi);
-      if (is_black(bsdf.f_cos) || !request.visible(s, node)) continue;
-      const float density = s.pdf_w * static_cast<float>(n);
-      const float weight = s.delta ? 1.0f : mis_weight(density, bsdf.pdf_w);
-      sum += bsdf.f_cos * s.radiance * (weight / density);
-    }
+    for (std::uint32_t j = 0; j < n; ++j) sum += sample_emitter(request, light, j, n);
     return sum;
+  }
+
+  /// Sample `j` of `n`.
+  template <class Request>
+  LN_INLINE Color sample_emitter(Request& request, const Emitters& light, std::uint32_t j, std::uint32_t n) const {
+    const float pick = light.size() == 1 ? 0 : request.random().get1(request.depth(), own(kPick), j, n);
+    const Vec2 position = request.random().get2(request.depth(), own(kPosition), j, n);
+    const LightSample s = light.sample(request.at().at, request.emitter_side(), pick, position);
+    if (!(s.pdf_w > 0) || is_black(s.radiance)) return Color(0);
+    const BsdfValue bsdf = request.evaluate(s.wi);
+    if (is_black(bsdf.f_cos) || !request.visible(s, node)) return Color(0);
+    const float density = s.pdf_w * static_cast<float>(n);
+    const float weight = s.delta ? 1.0f : mis_weight(density, bsdf.pdf_w);
+    return bsdf.f_cos * s.radiance * (weight / density);
   }
 
   template <class Request>

@@ -20,7 +20,7 @@ from itertools import product
 from lnc.diagnostics import Hop, Related, Reporter, Witness
 from lnc.library import CONTENTS
 from lnc.network import Expectation, Node, Term, TypedNetwork
-from lnc.passes.path_automaton import PathAutomaton
+from lnc.passes.path_automaton import PathAutomaton, reads_places
 from lnc.paths.automaton import Dfa, TooLarge, intersection
 from lnc.paths.language import ALL_ARRIVING, ALL_LIGHT, DARK, EMITTERS, EVENTS, Alphabet, path_dfa
 from lnc.paths.regex import Renderer
@@ -28,7 +28,6 @@ from lnc.paths.weighted import (
     Fault,
     SilentCycle,
     Weighted,
-    Word,
     common_blocks,
     find_faults,
     first_difference,
@@ -41,6 +40,9 @@ from lnc.source import Span
 CODES = {"often": "LN0301", "missing": "LN0302", "negative": "LN0303"}
 ROUTE_LIMIT = 4
 SPELLING_LIMIT = 256  # words that may be counted to shorten the letters of one
+
+Light = list[tuple[int, int]]
+"""States of the automaton, with how often each counts."""
 
 
 def check_paths(typed: TypedNetwork, reporter: Reporter, exact: bool = False, complete: bool = True) -> None:
@@ -101,10 +103,11 @@ class _Checker:
         if self.complete:
             self._check_dead(ends)
         for node in network.nodes:
-            if node.op.equal:
-                self._check_equal(node)
-        for target, expected in targets:
-            self._check(target, expected)
+            self._check_equal(node)
+            self._check_places(node)
+        if not any(d.code == "LN0307" for d in self.reporter.diagnostics):  # else counts would tell of that again
+            for target, expected in targets:
+                self._check(target, expected)
 
     def _is_difference(self, terms: tuple[Term, ...]) -> bool:
         """Light paths of a picture of a difference have been taken away on purpose."""
@@ -336,39 +339,71 @@ class _Checker:
 
     def _check_equal(self, node: Node) -> None:
         """LN0307 where the ports of an operator must carry equal light paths and do not."""
-        ports = [node.input(name) for name in node.op.equal]
-        first = ports[0]
-        assert first is not None
-        graph = self.automaton.graph
+        ports = [given for given in map(node.input, node.op.equal) if given is not None]
         for other in ports[1:]:
-            assert other is not None
             for content in CONTENTS:
-                ends = []
-                for given in (first, other):
-                    end = graph.state()
-                    for term in given.terms:
-                        for state in self.automaton.states_of(term.node, content):
-                            graph.skip(state, end, int(term.weight), Hop(node.name, term.span))
-                    ends.append({end})
-                blocks = common_blocks([graph.edges])
-                a, b = (self._weighted(end, blocks) for end in ends)
-                word = first_difference(a, b, self.exact)
-                if word is not None:
-                    self._report_unequal(node, (first.span, other.span), content, word, a, b)
+                lights = [
+                    [(state, int(t.weight)) for t in given.terms for state in self.automaton.states_of(t.node, content)]
+                    for given in (ports[0], other)
+                ]
+                found = self._unequal(*lights)
+                if found is not None:
+                    path, *counts = found
+                    message = f"'{node.op.name}' takes wires of equal light paths, but {path} is counted"
+                    message += f" {counts[0]} and {counts[1]} times"
+                    related = [
+                        Related(given.span, f"{count} times here, as {content}")
+                        for given, count in zip((ports[0], other), counts, strict=True)
+                    ]
+                    witness = Witness(path, counts[1], counts[0], ())
+                    self.reporter.error("LN0307", node.span, message, related=related, witness=witness)
                     break
 
-    def _report_unequal(
-        self, node: Node, spans: tuple[Span, Span], content: str, word: Word, a: Weighted, b: Weighted
-    ) -> None:
-        counts = a.count(word), b.count(word)
-        path = "".join(self._names(a.blocks[i])[0] for i in word)
-        message = f"'{node.op.name}' takes wires of equal light paths, but {path} is counted"
-        message += f" {counts[0]} and {counts[1]} times"
-        related = [
-            Related(span, f"{count} times here, as {content}") for span, count in zip(spans, counts, strict=True)
-        ]
-        witness = Witness(path, counts[1], counts[0], ())
-        self.reporter.error("LN0307", node.span, message, related=related, witness=witness)
+    def _check_places(self, node: Node) -> None:
+        """LN0307 where an operator reads light all over a part of the scene, of which some has other light paths."""
+        for rule in node.op.paths:
+            given = node.input(rule.port) if rule.port else None
+            for content in CONTENTS if given else ():
+                if given is None or not reads_places(rule, content):
+                    continue
+                arriving = [
+                    (state, letters, int(term.weight))
+                    for term in given.terms
+                    for state, letters in self.automaton.arriving(term.node, content)
+                ]
+                places = self.automaton.places(node, rule)
+                lights = [[(state, weight) for state, letters, weight in arriving if letters & p] for p in places]
+                for place, light in zip(places, lights, strict=True):
+                    found = self._unequal(lights[0], light) if light != lights[0] else None
+                    if found is not None:
+                        path, first, other = found
+                        diffuse = self.alphabet.events("D")
+                        where = [
+                            f"{count} time{'s' if count != 1 else ''} before {self._names(letters & diffuse)[0]}"
+                            for count, letters in ((first, places[0]), (other, place))
+                        ]
+                        message = f"'{node.op.name}' takes light that arrives alike all over what it reads, but {path}"
+                        message += f" is counted {' and '.join(where)}"
+                        help = f"read it where it arrives: {rule.emitter} = TAG"
+                        witness = Witness(path, other, first, ())
+                        self.reporter.error("LN0307", given.span, message, help=help, witness=witness)
+                        return
+
+    def _unequal(self, one: Light, other: Light) -> tuple[str, int, int] | None:
+        """A shortest path that sums of states with weights count differently, and both counts."""
+        graph = self.automaton.graph
+        ends = []
+        for light in (one, other):
+            end = graph.state()
+            for state, weight in light:
+                graph.skip(state, end, weight)
+            ends.append({end})
+        blocks = common_blocks([graph.edges])
+        a, b = (self._weighted(end, blocks) for end in ends)
+        word = first_difference(a, b, self.exact)
+        if word is None:
+            return None
+        return "".join(self._names(a.blocks[i])[0] for i in word), a.count(word), b.count(word)
 
     def _report_silent(self, states: list[int]) -> None:
         """LN0402 for a cycle that adds no event."""

@@ -69,6 +69,10 @@ class PathAutomaton:
         """The states of a wire; an emission's letter L is still to come there."""
         return [self.index[state] for state in self._by_wire[wire] if content in (None, state[1])]
 
+    def arriving(self, wire: str, content: str) -> list[tuple[int, int]]:
+        """The states of a wire with one content, and the events that may come next."""
+        return [(self.index[key], key[2]) for key in self._by_wire[wire] if key[1] == content]
+
     def wire(self, wire: str, content: str | None = None) -> set[int]:
         """Accepting states for what a wire carries, with one content or with all together."""
         accepting: set[int] = set()
@@ -162,8 +166,22 @@ class PathAutomaton:
                 entry = self._entry(node, rule, content, letters, left)
                 if entry is not None:
                     hop = None if node.op.output == "Emission" else Hop(node.name, term.span)
-                    counted = rule.port == (node.op.equal[0] if rule.port in node.op.equal else rule.port)
+                    counted = self._counted(node, rule, content, letters)
                     self.graph.skip(self.index[state], entry, int(term.weight) if counted else 0, hop)
+
+    def _counted(self, node: Node, rule: PathRule, content: str, letters: int) -> bool:
+        """Of inputs that carry equal light, and of places where light arrives that is read as one, the first counts."""
+        if rule.port in node.op.equal:
+            return rule.port == node.op.equal[0]
+        if not reads_places(rule, content):
+            return True
+        return bool(letters & self.places(node, rule)[0])
+
+    def places(self, node: Node, rule: PathRule) -> list[int]:
+        """For each tag combination on which a rule `in@from` reads its port, the events there."""
+        assert rule.emitter is not None
+        where = self._tagged(node, rule.emitter)
+        return [self.alphabet.events("DGS", 1 << c) for c in range(self.alphabet.combinations) if where >> c & 1]
 
     def _entry(self, node: Node, rule: PathRule, content: str, letters: int, left: int | None) -> int | None:
         """Where light enters a rule of an operator; None where its recursion ends."""
@@ -182,9 +200,8 @@ class PathAutomaton:
     def _fill(self, node: Node, rule: PathRule, content: str, letters: int, left: int | None, entry: int) -> None:
         target = content if rule.content == "unchanged" else rule.content
         if content != "emission":
-            if rule.emitter and tag_value(node, rule.emitter):  # read there, and taken for what arrives anywhere
-                read = letters & self.alphabet.events("DGS", self._tagged(node, rule.emitter))
-                letters = self.alphabet.events() if read else 0
+            if reads_places(rule, content):  # read there, and taken for what arrives anywhere
+                letters = self.alphabet.events() if any(letters & p for p in self.places(node, rule)) else 0
             self._events(node, rule, target, entry, content, letters, left)
             return
         emitters = letters & self._emitters(node, rule)
@@ -240,6 +257,11 @@ class PathAutomaton:
     def _tagged(self, node: Node, parameter: str) -> int:
         """The tag combinations that a tags parameter selects."""
         return self.alphabet.where(tag_value(node, parameter))
+
+
+def reads_places(rule: PathRule, content: str) -> bool:
+    """Does a rule read light that has arrived on some surfaces only, as one, to give it to any?"""
+    return rule.emitter not in (None, *EMITTERS) and content != "emission"
 
 
 def _steps_after(node: Node) -> int | None:

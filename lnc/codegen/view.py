@@ -290,7 +290,7 @@ class _Builder:
             emitters_layer=emitters_layer,
             differences=tuple(self.differences),
             shows_difference=image is not None and self.difference(image.terms) is not None,
-            subtracts=any(t.weight < 0 for terms in self.all_terms() for t in terms),
+            subtracts=any(self.is_signed(terms) for terms in self.results()),
             stored_taps=tuple(self.stored_tap(tap) for tap in self.schedule.stored_taps),
             probes=tuple(self.probe(i, probe) for i, probe in enumerate(self.schedule.probes)),
             lightmaps=tuple(self.lightmap(i, each) for i, each in enumerate(self.schedule.lightmaps)),
@@ -510,8 +510,8 @@ class _Builder:
             emitters = self.layer(name, "L S* E")
         for tap in self.schedule.taps:
             paths = self.paths_text(tap.terms)
-            is_signed = self.difference(tap.terms) is not None or any(w < 0 for w in _merged(tap.terms).values())
-            self.layers.append(LayerView(Path(tap.file).stem, paths, self.seen_terms(tap.terms), tap.file, is_signed))
+            signed = self.is_signed(tap.terms)
+            self.layers.append(LayerView(Path(tap.file).stem, paths, self.seen_terms(tap.terms), tap.file, signed))
         results = ([image.terms] if image else []) + [tap.terms for tap in self.schedule.taps]
         for n in dict.fromkeys(self.difference(terms) for terms in results):
             if n is not None:
@@ -571,12 +571,16 @@ class _Builder:
             for wire, weight in _merged(terms).items()
         )
 
-    def all_terms(self) -> list[tuple[Term, ...]]:
-        """Every sum of the network."""
-        sums = [i.terms for n in self.schedule.nodes for i in n.inputs] + [tap.terms for tap in self.schedule.taps]
-        sums += [probe.terms for probe in self.schedule.probes]
-        sums += [lightmap.terms for lightmap in self.schedule.lightmaps]
-        return sums + ([self.schedule.image.terms] if self.schedule.image else [])
+    def is_signed(self, terms: tuple[Term, ...]) -> bool:
+        """May a sum be negative? Where something on the way is subtracted, or scaled: --set may give any factor."""
+        nodes = [self.by_name[name] for name in self.upstream((t.node for t in terms), through_caches=True)]
+        sums = [terms, *(i.terms for n in nodes for i in n.inputs)]
+        return any(n.op.name == "Scale" for n in nodes) or any(t.weight < 0 for terms in sums for t in terms)
+
+    def results(self) -> list[tuple[Term, ...]]:
+        """The sums that become pictures and tables."""
+        written = [*self.schedule.taps, *self.schedule.probes, *self.schedule.lightmaps]
+        return [each.terms for each in written] + ([self.schedule.image.terms] if self.schedule.image else [])
 
     def stored_tap(self, tap: Tap) -> StoredTapView:
         wire = tap.terms[0].node

@@ -174,6 +174,16 @@ def test_stored_irradiance_is_known_on_surfaces(compiled_network, measure, tmp_p
         assert "sensors.csv:3: this sensor is on no surface, but 'near' is known on surfaces only" in done.stderr
 
 
+@pytest.mark.parametrize("place", ["1e30,0,0", "0,-1e300,0"])
+def test_a_sensor_out_of_reach(compiled_network, tmp_path, place):
+    program = compiled_network("lux", text=PROBE)
+    (tmp_path / "sensors.csv").write_text(f"0,1,0,0,1,0\n{place},0,1e300,0\n")
+    command = [str(program), str(SCENES / "plane_area.gltf")]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert done.returncode == 1
+    assert "sensors.csv:2: this sensor is too far away from the scene" in done.stderr
+
+
 def test_no_image_no_picture(compiled_network, run_program, tmp_path):
     program = compiled_network("lux", text=PROBE)
     (tmp_path / "sensors.csv").write_text("0,0.5,0,0,1,0\n")

@@ -165,8 +165,6 @@ DVec3 direction(const DVec3& v) {
   return scaled / std::sqrt(glm::dot(scaled, scaled));
 }
 
-bool is_finite_position(const Vec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
-
 void SceneReader::add_camera(const Placed& placed) {
   const Json node = model_.nodes[placed.node], json = model_.cameras[node["camera"].index()];
   Camera camera;
@@ -178,9 +176,9 @@ void SceneReader::add_camera(const Placed& placed) {
   const DVec3 forward = direction(-placed.world.linear[2]), y = placed.world.linear[1];
   const DVec3 up = direction(direction(y) - forward * glm::dot(forward, direction(y)));
   const DVec3 right = direction(glm::cross(forward, up));
-  if (!is_finite_position(camera.position) || right == DVec3(0)) {
-    return model_.notes.count("camera is ignored: its transform is singular or not finite",
-                              "cameras are ignored: their transforms are singular or not finite", 1);
+  if (!within_reach(camera.position) || right == DVec3(0)) {
+    return model_.notes.count("camera is ignored: its transform is singular, or leads too far away",
+                              "cameras are ignored: their transforms are singular, or lead too far away", 1);
   }
   camera.forward = Vec3(forward);
   camera.up = Vec3(up);
@@ -192,7 +190,7 @@ void SceneReader::add_camera(const Placed& placed) {
   if (camera.orthographic) {
     camera.ymag = static_cast<float>(lens["ymag"].number(1) / scene_.unit);
     camera.aspect = static_cast<float>(lens["xmag"].number(1) / lens["ymag"].number(1));
-    if (!(camera.ymag > 0 && std::isfinite(camera.ymag)))
+    if (!(camera.ymag > 0 && within_reach(Vec3(camera.ymag * std::max(camera.aspect, 1.0f)))))
       lens.fail("ymag", number_text(lens["ymag"].number(1)) + " is out of proportion to the scene");
   } else {
     camera.yfov = static_cast<float>(lens["yfov"].number(0.8));
@@ -209,7 +207,7 @@ Vec3 SceneReader::scaled_intensity(Json light, double factor) const {
   for (const Json component : light["color"]) color[i++] = std::clamp(component.number(1), 0.0, 1.0);
   for (int k = 0; k < 3; ++k)
     intensity[static_cast<std::size_t>(k)] = static_cast<float>(color[static_cast<std::size_t>(k)] * strength * factor);
-  if (!is_finite_position(intensity))
+  if (!(std::isfinite(intensity.x) && std::isfinite(intensity.y) && std::isfinite(intensity.z)))
     light.fail("intensity", number_text(strength) + " is out of proportion to the scene's size of " + number_text(scene_.unit));
   return intensity;
 }
@@ -227,9 +225,9 @@ void SceneReader::add_light(const Placed& placed) {
   light.position = normalised_(placed.world.translation);
   const DVec3 shines = direction(-placed.world.linear[2]);
   const bool needs_direction = light.kind != PunctualKind::point, needs_position = light.kind != PunctualKind::directional;
-  if ((needs_direction && shines == DVec3(0)) || (needs_position && !is_finite_position(light.position))) {
-    return model_.notes.count("light is ignored: its transform is singular or not finite",
-                              "lights are ignored: their transforms are singular or not finite", 1);
+  if ((needs_direction && shines == DVec3(0)) || (needs_position && !within_reach(light.position))) {
+    return model_.notes.count("light is ignored: its transform is singular, or leads too far away",
+                              "lights are ignored: their transforms are singular, or lead too far away", 1);
   }
   if (!needs_position) light.position = Vec3(0);
   if (needs_direction) light.direction = Vec3(shines);

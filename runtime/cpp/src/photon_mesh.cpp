@@ -8,7 +8,10 @@
 #include <unordered_map>
 
 #include "ln/disjoint_sets.hpp"
+#include "ln/error.hpp"
+#include "ln/stats.hpp"
 #include "ln/surface_density.hpp"
+#include "ln/text.hpp"
 
 namespace ln {
 
@@ -24,6 +27,9 @@ constexpr float kWallHeight = 0.02f, kWallMinCos = 0.05f, kWallInset = 1e-3f;
 constexpr float kWallSpacing = 1.0f / 32;
 /// Vertices below a wall are seen from points that are so far to its sides [radii; ways to the middle of a triangle, at most].
 constexpr float kWallOffset = 0.02f, kWallMaxOffset = 0.25f;
+
+/// So much memory a triangle takes while the mesh is made, its share of vertices and edges included.
+constexpr double kTriangleBytes = 256;
 
 /// A surface with more photons than this is sorted by all threads together.
 constexpr std::size_t kManyPhotons = 1 << 16;
@@ -94,6 +100,7 @@ class MeshBuilder {
 
   TriMesh build() {
     sort_photons();
+    check_size();
     std::vector<Piece> pieces = whole_faces();
     for (int level = 0; !pieces.empty(); ++level) {
       choose_radii();
@@ -116,6 +123,24 @@ class MeshBuilder {
     context_.parallel_for(surfaces_.size(), [&](Tracer&, std::size_t i) {
       if (!sorted_.on(i).empty() && !surfaces_[i]) sort(i);
     });
+  }
+
+  /// Narrow kernels that photons do not call for would make more triangles than there is memory for: an edge is as long as
+  /// the widest allows, at most.
+  void check_size() const {
+    if (options_.kernels.max_radius == 0) return;
+    const double edge = static_cast<double>(options_.spacing) * static_cast<double>(options_.kernels.max_radius);
+    const double largest = std::sqrt(3.0) / 4 * edge * edge;  // area of a triangle
+    double least = 0;
+    for (std::uint32_t face = 0; face < patches_.face_count(); ++face) {
+      const std::optional<SurfaceDensity>& surface = surfaces_[sorted_.surface_of_face(face)];
+      if (surface && !surface->even()) least += static_cast<double>(area(patches_.surface(face / 2))) / largest;
+    }
+    const std::uint64_t limit = available_memory_bytes() / 3;
+    if (least * kTriangleBytes > static_cast<double>(limit))
+      throw Error("kernels of this 'radius' need a mesh that takes more than " + bytes_text(least * kTriangleBytes) +
+                  " of memory, and only " + bytes_text(static_cast<double>(limit)) +
+                  " may be used for it: raise 'radius' or 'spacing' of SurfaceDE");
   }
 
   /// The triangles of all lit faces, whose corners are the first vertices: one where faces of a surface meet.

@@ -56,6 +56,8 @@ void Probe::place(Tracer& tracer) {
   places_.reserve(file_.sensors.size());
   for (const Sensor& sensor : file_.sensors) {
     const Vec3 position((sensor.position - data.origin) / data.unit);
+    if (!within_reach(position))
+      throw Error(printable(file_.path) + ":" + std::to_string(sensor.line) + ": this sensor is too far away from the scene");
     places_.push_back({position, sensor.normal, surface_at(tracer, position, sensor.normal)});
     if (places_.back().hit.found()) continue;
     if (free++ == 0) first_free = sensor.line;

@@ -135,15 +135,14 @@ class Reader {
     for (std::size_t k = 0; k < kColumns.size(); ++k) {
       const std::string_view field = fields_[place_[k]];
       const std::optional<double> number = parse_number(field);
-      // Beyond the largest float nothing can be traced.
-      if (!number || !(std::abs(*number) <= static_cast<double>(std::numeric_limits<float>::max())))
-        fail(std::string(kColumns[k]) + " must be a finite number, not " + quoted(field));
+      if (!number || !std::isfinite(*number)) fail(std::string(kColumns[k]) + " must be a finite number, not " + quoted(field));
       values[k] = *number;
     }
     const DVec3 normal(values[3], values[4], values[5]);
-    const double length = glm::length(normal);
-    if (!(length > 1e-30)) fail("the normal nx,ny,nz is zero; it says which way the sensor looks");
-    file_.sensors.push_back({DVec3(values[0], values[1], values[2]), Vec3(normal / length), line_, kept_text()});
+    const double largest = std::max({std::abs(normal.x), std::abs(normal.y), std::abs(normal.z)});
+    if (largest == 0) fail("the normal nx,ny,nz is zero; it says which way the sensor looks");
+    const Vec3 unit(glm::normalize(normal / largest));
+    file_.sensors.push_back({DVec3(values[0], values[1], values[2]), unit, line_, kept_text()});
   }
 
   static std::string count_text(std::size_t n, const char* what) {

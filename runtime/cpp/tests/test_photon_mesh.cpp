@@ -3,6 +3,7 @@
 
 #include <cstring>
 
+#include "ln/error.hpp"
 #include "ln/mesh_reduction.hpp"
 #include "ln/photon_mesh.hpp"
 #include "photon_scenes.hpp"
@@ -203,6 +204,18 @@ TEST_CASE("light does not leak below a thin wall") {
   const Meshed m(b.data, 200'000, path_automaton<EmptyPath>());
   CHECK(m.mean([](Vec2 u) { return Vec2(-0.003f - 0.02f * u.x, 0.6f * u.y - 0.3f); }, 0.4f) < 1e-3);
   CHECK(m.mean([](Vec2 u) { return Vec2(0.003f + 0.02f * u.x, 0.6f * u.y - 0.3f); }, 0.4f) == doctest::Approx(1).epsilon(0.03));
+}
+
+TEST_CASE("kernels whose mesh would not fit into memory are refused at once") {
+  SceneBuilder b;
+  add_floor(b);
+  b.directional({0, -1, 0}, Color(1));
+  Meshed m(b.data, 2000);
+  const auto mesh = [&](float radius) {
+    return photon_mesh(m.stage.context, m.sorted, {.node = 1, .kernels = {.max_radius = radius}});
+  };
+  CHECK_THROWS_WITH_AS(mesh(1e-6f), doctest::Contains("raise 'radius' or 'spacing' of SurfaceDE"), Error);
+  CHECK(mesh(0.05f).vertices().size() > 0);
 }
 
 TEST_CASE("any number of threads makes the same mesh") {

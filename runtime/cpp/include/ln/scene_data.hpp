@@ -5,9 +5,10 @@
 // of all triangles and `unit` a power of two such that its half diagonal lies in (1/2, 1]. Radiances and directional
 // intensities (irradiance) are independent of the unit; intensities of point and spot lights [W/sr] are stored divided
 // by unit^2, attenuation distances divided by unit. A scene without triangles has origin 0 and unit 1; cameras and lights do
-// not count for the box and may stand anywhere.
+// not count for the box and may stand anywhere within kFarthest.
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -15,6 +16,13 @@
 #include "ln/math.hpp"
 
 namespace ln {
+
+/// So far from the middle, in normalised units, rays may begin; squares of such distances are still far from infinite.
+constexpr float kFarthest = 1e12f;
+
+inline bool within_reach(const Vec3& p) {
+  return std::abs(p.x) <= kFarthest && std::abs(p.y) <= kFarthest && std::abs(p.z) <= kFarthest;
+}
 
 enum class Wrap : std::uint8_t { repeat, clamp, mirror };
 

@@ -29,12 +29,13 @@ class SurfaceDensity {
   /// everywhere.
   KernelRadii radii(const Neighbourhood& around) const;
 
+  /// Are there too few photons for kernels?
+  bool even() const { return half_[0].empty(); }
+
   /// Irradiance [W/m^2].
   Color irradiance(const Neighbourhood& around, const KernelRadii& radii) const;
 
  private:
-  bool even() const { return half_[0].empty(); }
-
   const SurfaceArea* area_;
   TriangleFilter sheet_;
   KernelRange kernels_;  // in each half

@@ -579,7 +579,7 @@ class _Builder:
 
     def results(self) -> list[tuple[Term, ...]]:
         """The sums that become pictures and tables."""
-        written = [*self.schedule.taps, *self.schedule.probes, *self.schedule.lightmaps]
+        written: list[Tap | Probe | Lightmap] = [*self.schedule.taps, *self.schedule.probes, *self.schedule.lightmaps]
         return [each.terms for each in written] + ([self.schedule.image.terms] if self.schedule.image else [])
 
     def stored_tap(self, tap: Tap) -> StoredTapView:

@@ -204,14 +204,16 @@ def _read_used(name: str, source: SourceFile) -> SourceFile:
 
 
 def _with_calls(diagnostics: list[Diagnostic], calls: dict[Span, Span]) -> list[Diagnostic]:
-    """A mistake inside a macro is also shown where the macro is called."""
+    """A mistake inside a macro is also shown where the macro is called, and the macro that calls it, and so on."""
     shown: list[Diagnostic] = []
     for diagnostic in diagnostics:
-        for macro, call in calls.items():
-            if macro.holds(diagnostic.span):
-                called = Related(call, "in this call of the macro")
-                diagnostic = replace(diagnostic, related=(*diagnostic.related, called))
-        shown.append(diagnostic)
+        related = list(diagnostic.related)
+        place: Span | None = diagnostic.span
+        while place is not None:
+            place = next((call for macro, call in calls.items() if macro.holds(place)), None)
+            if place is not None:
+                related.append(Related(place, "in this call of the macro"))
+        shown.append(replace(diagnostic, related=tuple(related)))
     return shown
 
 

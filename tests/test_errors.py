@@ -101,3 +101,28 @@ def test_a_wrong_value_for_a_macro_is_shown_at_both_places(library: Library) -> 
     (found,) = compile_network(source, library).diagnostics
     assert (found.code, found.span.text) == ("LN0104", "-1")
     assert [related.span.text for related in found.related] == ["samples = rays"]
+
+
+def test_a_mistake_in_a_macro_is_shown_at_the_calls_that_led_there(library: Library) -> None:
+    text = """tag floor = mesh "Floor"
+op Bounce(in: Points, at = floor) -> Points {
+    out = PathTracer(in, from = at)
+}
+op Outer(in: Points, where = floor) -> Points {
+    out = Bounce(in, at = where)
+}
+direct = Direct(Lights(), to = floor)
+image direct + Outer(direct) + Outer(direct, where = !floor)
+"""
+    found = [d for d in compile_network(SourceFile("calls.ln", text), library).diagnostics if d.severity == "error"]
+    assert [(d.code, d.span.line) for d in found] == [("LN0304", 3)]
+    calls = [r.span for r in found[0].related if r.message == "in this call of the macro"]
+    assert [(c.line, c.text) for c in calls] == [(6, "Bounce"), (9, "Outer")]
+    assert calls[1].start == text.rindex("Outer")  # the second call, not the first
+
+
+def test_a_mistake_in_a_macro_that_is_called_twice_is_one_mistake(library: Library) -> None:
+    text = "op Dark(in: Emission) -> Points {\n    out = Direct(in, samples = 0)\n}\n"
+    text += "light = Lights()\nimage Dark(light) + Dark(light)\n"
+    found = compile_network(SourceFile("twice.ln", text), library).diagnostics
+    assert [(d.code, d.span.text, len(d.related)) for d in found] == [("LN0104", "0", 1)]

@@ -78,7 +78,11 @@ class Reporter:
         self.error(code, span, message, label=label, help=help, severity="warning")
 
     def _add(self, diagnostic: Diagnostic) -> None:
-        if len(self.diagnostics) < self.limit and diagnostic not in self.diagnostics:
+        same = any(  # also in another call of a macro
+            (d.code, d.message, str(d.span)) == (diagnostic.code, diagnostic.message, str(diagnostic.span))
+            for d in self.diagnostics
+        )
+        if len(self.diagnostics) < self.limit and not same:
             self.diagnostics.append(diagnostic)
 
     @property

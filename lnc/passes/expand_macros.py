@@ -5,19 +5,22 @@
     }
     bounce = Indirect(direct)
 
-On entry: any syntax tree. On exit: no macro, no `use`, no call of a macro. Spans stay those of the macro's text;
-`calls` says which call led into each macro, so that a mistake inside is shown at both places. Faults are LN0111.
+On entry: any syntax tree. On exit: no macro, no `use`, no call of a macro. Spans stay those of the macro's text, with a
+source of its own for each call but the first; `calls` says which call that was, so that a mistake inside is shown
+at both places. Faults are LN0111.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from lnc.diagnostics import Related, Reporter, did_you_mean, quote
 from lnc.library import POINTS, Library, snake_case
 from lnc.naming import Names
 from lnc.passes.resolve import report_unknown_representation
+from lnc.record import Record
 from lnc.source import SourceFile, Span
 from lnc.syntax import ast
 from lnc.syntax.parse import parse
@@ -32,7 +35,7 @@ Read = Callable[[str, SourceFile], SourceFile]
 
 @dataclass(frozen=True)
 class Expanded:
-    """A file without macros, and for each macro that was used its span and its first call."""
+    """A file without macros, and for each use of a macro its span and the call."""
 
     file: ast.File
     calls: dict[Span, Span] = field(default_factory=dict)
@@ -230,7 +233,10 @@ class _Expander:
             self.reporter.error("LN0111", call.op_span, f"the macro {quote(call.op)} uses itself: {loop}")
             self.broken.add(name)
             return
-        self.calls.setdefault(macro.span, call.op_span)
+        if macro.span in self.calls:
+            source = macro.span.source
+            macro = _copied(macro, SourceFile(source.name, source.text))
+        self.calls[macro.span] = call.op_span
         wires: dict[str, ast.WireExpression] = {}
         values: dict[str, ast.Value] = {}
         ports = [i for i in macro.inputs if i.representation is not None]
@@ -360,6 +366,18 @@ class _Expander:
                 self.reporter.error("LN0103", argument.name_span, message, help=help)
             elif argument.name in values:
                 values[argument.name] = argument.value
+
+
+def _copied(tree: Any, source: SourceFile) -> Any:
+    """A part of a syntax tree with its spans in another source of the same text."""
+    match tree:
+        case Span(_, start, end):
+            return Span(source, start, end)
+        case tuple():
+            return tuple(_copied(part, source) for part in tree)
+        case Record():
+            return tree.changed(**{name: _copied(part, source) for name, part in vars(tree).items()})
+    return tree
 
 
 def _with_tags(path: ast.PathExpression, values: Mapping[str, ast.Value]) -> ast.PathExpression:

@@ -158,7 +158,7 @@ def _check(arguments: argparse.Namespace) -> int:
         return WRONG
     for path in arguments.files:
         try:
-            result = compile_network(read_source(path), library, exact=arguments.exact)
+            result = compile_network(read_source(path), library, exact=arguments.exact, macros=True)
         except Unreadable as error:
             status = USAGE
             found.append(unreadable(path, str(error)))

@@ -101,12 +101,19 @@ def write_text(path: str, text: str) -> None:
         raise Unreadable(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from error
 
 
-def compile_network(source: SourceFile, library: Library, dump: Dump | None = None, exact: bool = False) -> Result:
-    """All passes over one text. After an error they go on with the part of the network that it does not reach."""
+def compile_network(
+    source: SourceFile, library: Library, dump: Dump | None = None, exact: bool = False, macros: bool = False
+) -> Result:
+    """All passes over one text. After an error they go on with the part of the network that it does not reach.
+
+    `macros`: the text may be one for `use`, of macros alone, which are not called here.
+    """
     reporter = Reporter()
     file = parse(source, reporter)
     _dump_text(dump, "parse", file)
     expanded = expand_macros(file, library, _read_used, reporter)
+    if macros and file.statements and all(isinstance(s, ast.Macro | ast.Use) for s in file.statements):
+        return Result(file, None, {}, None, reporter.sorted())
     file = expanded.file
     _dump_text(dump, "expand_macros", file)
     network = resolve(file, _default_name(source.name), library, reporter, expanded.broken | file.broken)

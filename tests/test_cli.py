@@ -37,6 +37,16 @@ def test_check_status(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "bad.ln:2:14" in output.err and "did you mean 'light'?" in output.err
 
 
+def test_a_file_of_macros_alone_is_no_network_but_fine(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "macros.ln").write_text("op Twice(in: Points) -> Points {\n    out = Scale(in, factor = 2)\n}\n")
+    (folder / "wrong.ln").write_text("op Twice(in: Poinst) -> Points {\n    out = Scale(in, factor = 2)\n}\n")
+    assert main(["check", "macros.ln", "good.ln"]) == 0
+    assert main(["check", "wrong.ln"]) == 1
+    assert "did you mean 'Points'?" in capsys.readouterr().err
+    assert main(["compile", "macros.ln", "-o", "program"]) == 1
+    assert "the network has no result" in capsys.readouterr().err
+
+
 def test_a_pipe_is_not_used(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Nobody writes into it, so reading it would never end."""
     os.mkfifo(folder / "pipe.ln")

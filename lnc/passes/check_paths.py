@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from itertools import product
 
 from lnc.diagnostics import Hop, Related, Reporter, Witness
-from lnc.library import CONTENTS
-from lnc.network import Expectation, Node, Term, TypedNetwork
+from lnc.library import CONTENTS, PathRule
+from lnc.network import Expectation, Input, Node, Term, TypedNetwork
 from lnc.passes.path_automaton import PathAutomaton, reads_places
 from lnc.paths.automaton import Dfa, TooLarge, intersection
 from lnc.paths.language import ALL_ARRIVING, ALL_LIGHT, DARK, EMITTERS, EVENTS, Alphabet, path_dfa
@@ -363,31 +363,36 @@ class _Checker:
         """LN0307 where an operator reads light all over a part of the scene, of which some has other light paths."""
         for rule in node.op.paths:
             given = node.input(rule.port) if rule.port else None
-            for content in CONTENTS if given else ():
-                if given is None or not reads_places(rule, content):
-                    continue
-                arriving = [
-                    (state, letters, int(term.weight))
-                    for term in given.terms
-                    for state, letters in self.automaton.arriving(term.node, content)
-                ]
-                places = self.automaton.places(node, rule)
-                lights = [[(state, weight) for state, letters, weight in arriving if letters & p] for p in places]
-                for place, light in zip(places, lights, strict=True):
-                    found = self._unequal(lights[0], light) if light != lights[0] else None
-                    if found is not None:
-                        path, first, other = found
-                        diffuse = self.alphabet.events("D")
-                        where = [
-                            f"{count} time{'s' if count != 1 else ''} before {self._names(letters & diffuse)[0]}"
-                            for count, letters in ((first, places[0]), (other, place))
-                        ]
-                        message = f"'{node.op.name}' takes light that arrives alike all over what it reads, but {path}"
-                        message += f" is counted {' and '.join(where)}"
-                        help = f"read it where it arrives: {rule.emitter} = TAG"
-                        witness = Witness(path, other, first, ())
-                        self.reporter.error("LN0307", given.span, message, help=help, witness=witness)
-                        return
+            if given is None:
+                continue
+            for content in CONTENTS:
+                if reads_places(rule, content) and self._differs(node, rule, given, content):
+                    return
+
+    def _differs(self, node: Node, rule: PathRule, given: Input, content: str) -> bool:
+        places = self.automaton.places(node, rule)
+        arriving = [
+            (state, letters, int(term.weight))
+            for term in given.terms
+            for state, letters in self.automaton.arriving(term.node, content)
+        ]
+        lights = [[(state, weight) for state, letters, weight in arriving if letters & place] for place in places]
+        for place, light in zip(places, lights, strict=True):
+            found = self._unequal(lights[0], light) if light != lights[0] else None
+            if found is None:
+                continue
+            path, first, other = found
+            diffuse = self.alphabet.events("D")
+            where = [
+                f"{count} time{'s' if count != 1 else ''} before {self._names(letters & diffuse)[0]}"
+                for count, letters in ((first, places[0]), (other, place))
+            ]
+            message = f"'{node.op.name}' takes light that arrives alike all over what it reads, but {path}"
+            message += f" is counted {' and '.join(where)}"
+            help = f"read it where it arrives: {rule.emitter} = TAG"
+            self.reporter.error("LN0307", given.span, message, help=help, witness=Witness(path, other, first, ()))
+            return True
+        return False
 
     def _unequal(self, one: Light, other: Light) -> tuple[str, int, int] | None:
         """A shortest path that sums of states with weights count differently, and both counts."""

@@ -370,13 +370,12 @@ class _Expander:
 
 def _copied(tree: Any, source: SourceFile) -> Any:
     """A part of a syntax tree with its spans in another source of the same text."""
-    match tree:
-        case Span(_, start, end):
-            return Span(source, start, end)
-        case tuple():
-            return tuple(_copied(part, source) for part in tree)
-        case Record():
-            return tree.changed(**{name: _copied(part, source) for name, part in vars(tree).items()})
+    if isinstance(tree, Span):
+        return Span(source, tree.start, tree.end)
+    if isinstance(tree, tuple):
+        return tuple([_copied(part, source) for part in tree])
+    if isinstance(tree, Record):
+        return type(tree)(*[_copied(getattr(tree, name), source) for name in tree.__match_args__])
     return tree
 
 

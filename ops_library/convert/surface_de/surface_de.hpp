@@ -8,8 +8,8 @@ namespace ln::ops {
 /// Irradiance at the vertices of a mesh, from photons by surface; see surface_de.ln.
 struct SurfaceDE {
   NodeId node;
-  std::int64_t neighbours = 3200;
-  std::int64_t fewest = 100;
+  std::int64_t neighbours = 6400;
+  std::int64_t fewest = 25;
   float radius = 0;  // [m]; 0: automatic
   float spacing = 0.7f;
 

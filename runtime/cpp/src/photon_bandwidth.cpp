@@ -6,10 +6,6 @@ namespace ln {
 
 namespace {
 
-/// Up to this difference estimates are taken to be of the same light, and of different light from the other one on [standard
-/// errors of their difference]. In between, their means are taken: a choice would make specks.
-constexpr float kSame = 2, kDifferent = 3.5f;
-
 /// Kernels that an estimate may choose from.
 constexpr int kMaxKernels = 13;
 /// Of them, so many get their photons from one search: most points need several.
@@ -145,8 +141,8 @@ LocalEstimate adaptive_local_linear(const PhotonMap& map, const SurfaceArea& are
     const LocalEstimate e = photons.estimate(wanted, radius, area, filter);
     float difference = 0;
     for (int k = 0; k < kernels; ++k) difference = std::max(difference, standard_errors(e, narrower[k]));
-    if (difference >= kDifferent) break;
-    const float old = std::max((difference - kSame) / (kDifferent - kSame), 0.0f);
+    if (difference >= range.different) break;
+    const float old = std::max((difference - range.same) / (range.different - range.same), 0.0f);
     result = {glm::mix(e.E, result.E, old), std::lerp(e.sigma, result.sigma, old), std::lerp(e.radius, result.radius, old),
               e.area};
     narrower[kernels] = e;

@@ -110,6 +110,7 @@ class MeshBuilder {
       pieces.swap(next);
     }
     part_at_walls();
+    pool_radii();
     return estimate();
   }
 
@@ -210,12 +211,13 @@ class MeshBuilder {
     });
   }
 
-  /// Is an edge longer than the kernels at its ends allow, or a wall across it? Both sides of it agree, so there are no cracks.
+  /// Is an edge longer than the wider kernel at its ends allows, or a wall across it? Both sides of it agree, so there are no
+  /// cracks. The wider one: a kernel that is narrow by chance is alone, and calls for no finer mesh.
   bool too_long(std::uint32_t a, std::uint32_t b, Tracer& tracer) const {
     if (a > b) std::swap(a, b);
     const Vertex& p = vertices_[a];
     const Vertex& q = vertices_[b];
-    const float length = glm::distance(p.around.point, q.around.point), radius = 0.5f * (p.radii.mean() + q.radii.mean());
+    const float length = glm::distance(p.around.point, q.around.point), radius = std::max(p.radii.mean(), q.radii.mean());
     if (length > options_.spacing * radius) return true;
     if (!(length > kWallSpacing * options_.spacing * radius)) return false;
     return wall_between(p.around.point, q.around.point, p.around.normal, q.around.normal, kWallHeight * radius, tracer);
@@ -417,6 +419,29 @@ class MeshBuilder {
         vertices_[v].radii = surfaces_[vertices_[v].surface]->radii(vertices_[v].around);
       }
     });
+  }
+
+  /// Gives each vertex the median of its radii and its neighbours': kernels that are narrow by chance are few and apart, those
+  /// along an edge of the light have each other.
+  void pool_radii() {
+    std::vector<std::vector<std::uint32_t>> around(vertices_.size());
+    for (std::uint32_t v = 0; v < around.size(); ++v) around[v].push_back(v);
+    for (const Piece& piece : done_)
+      for (std::size_t k = 0; k < 3; ++k) around[piece.triangle.vertex[k]].push_back(piece.triangle.vertex[(k + 1) % 3]);
+    std::vector<KernelRadii> pooled(vertices_.size());
+    context_.for_chunks(vertices_.size(), 1024, [&](std::size_t begin, std::size_t end, Tracer&) {
+      std::vector<float> radii;
+      for (std::size_t v = begin; v < end; ++v) {
+        for (std::size_t half = 0; half < 2; ++half) {
+          radii.clear();
+          for (const std::uint32_t w : around[v]) radii.push_back(vertices_[w].radii.half[half]);
+          const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
+          std::nth_element(radii.begin(), middle, radii.end());
+          pooled[v].half[half] = *middle;
+        }
+      }
+    });
+    for (std::size_t v = 0; v < vertices_.size(); ++v) vertices_[v].radii = pooled[v];
   }
 
   TriMesh estimate() {

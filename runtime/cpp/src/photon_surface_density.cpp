@@ -4,6 +4,13 @@
 
 namespace ln {
 
+namespace {
+
+/// As in KernelRange, but lower: who asks takes medians of neighbouring radii, so that single wrong ones do no harm.
+constexpr float kSame = 0.75f, kDifferent = 2;
+
+}  // namespace
+
 SurfaceDensity::SurfaceDensity(PrepareContext& context, const SurfaceArea& area, const SortedPhotons& sorted,
                                std::uint32_t surface, const SurfaceKernels& kernels)
     : area_(&area), sheet_{sorted.sheet_of_triangle.data(), surface / 2} {
@@ -19,6 +26,8 @@ SurfaceDensity::SurfaceDensity(PrepareContext& context, const SurfaceArea& area,
   half_[0] = PhotonMap(context, photons.first(middle));
   half_[1] = PhotonMap(context, photons.subspan(middle));
   kernels_ = kernel_range(context, half_[0], std::max(kernels.least / 2, 1), std::max(kernels.most / 2, 1), kernels.max_radius);
+  kernels_.same = kSame;
+  kernels_.different = kDifferent;
 }
 
 // Each half's kernel is as wide as the other half says, so that photons do not choose their own weight.

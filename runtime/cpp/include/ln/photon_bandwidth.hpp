@@ -29,6 +29,10 @@ struct KernelRange {
   int least = 20, most = 800;  // photons under the narrowest and the widest kernel
   float narrow_radius = 0;     // the narrowest kernel is no wider [normalised units]
   float max_radius = 0;        // nor any other than this
+
+  /// Up to this difference estimates are taken to be of the same light, and of different light from the other one on [standard
+  /// errors of their difference]. In between, their means are taken: a choice would make specks.
+  float same = 2, different = 3.5f;
 };
 
 /// `radius`: no kernel is wider [normalised units]; 0: chosen from the photons.

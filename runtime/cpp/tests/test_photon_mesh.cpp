@@ -145,8 +145,7 @@ TEST_CASE("a dark strip between bright ones stays dark") {
       return static_cast<double>(mesh.irradiance(hit.triangle, hit.u, hit.v, true).x);
     });
   };
-  // A tenth of the light beside the strip comes half way in; with kernels of a hundred photons at least, it is a twentieth
-  // more.
+  // Kernels of a hundred photons at least leave 0.05 too much in the middle.
   CHECK(mean_within(0.01f) < static_cast<double>(kDark) + 0.035);
   CHECK(mean_within(0.7f) == doctest::Approx(kWhole / 0.7).epsilon(0.02));
 }

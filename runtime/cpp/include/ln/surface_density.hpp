@@ -16,7 +16,7 @@ struct KernelRadii {
 /// What is asked of the kernels on each surface.
 struct SurfaceKernels {
   int least = 25, most = 6400;  // photons under the narrowest and the widest
-  float max_radius = 0;          // none is wider [normalised units]; 0: chosen from the photons
+  float max_radius = 0;         // none is wider [normalised units]; 0: chosen from the photons
 };
 
 class SurfaceDensity {

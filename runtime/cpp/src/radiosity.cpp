@@ -25,6 +25,8 @@ constexpr float kDarkest = 1;
 /// Weight of errors from uneven sources: unlike others they have mostly the same sign, since bright places are near to each
 /// other.
 constexpr float kSourceWeight = 4;
+/// A link between things that overlap errs by so many times what it carries.
+constexpr float kOverlapping = 8;
 /// Cells that are nearer to each other, in sums of their radii, look at each other by solid angle.
 constexpr float kNear = 3;
 /// Rays of a link that is dropped when all of them are blocked.
@@ -39,6 +41,8 @@ constexpr float kLargestCorrection = 1.5f;
 constexpr float kEven = 0.1f;
 /// Gathering goes down to cells of this radius, as a share of the distance; those of less than kFar count as points.
 constexpr float kResolved = 0.12f, kFar = 0.08f;
+/// Leaves of a larger radius, in half diagonals of the scene, gather at several points.
+constexpr float kSmall = 1.0f / 16;
 /// Residual of iterations whose result is not the last one.
 constexpr float kRoughly = 0.03f;
 
@@ -62,6 +66,7 @@ class Solver {
     for (const float coarser : kCoarser) {
       if (!(mean_radiosity() > 0)) return QuadTree(patches_);
       refine(coarser * options_.error * mean_);
+      if (coarser == 1) drop_hidden();
       correct_sums();
       report.residual = iterate(sources(), irradiance_, coarser > 1 ? kRoughly : options_.residual, report);
       pull(irradiance_, radiosity_);
@@ -107,9 +112,7 @@ class Solver {
     if (link.rays == 0)
       for (int c = 0; c < 4; ++c) link.factor[c] = form_factor(r.flat, child(s.flat, c)).mean;
     measure_visibility(link, rays, tracer);
-    // Links of few rays stay, as those that seem visible by chance do: rays are cast for them again at the end.
-    const bool hidden = link.visibility == 0 && link.rays >= kRaysOfHidden;
-    return hidden ? Verdict::drop : Verdict::keep;
+    return Verdict::keep;
   }
 
   /// How much the radiosity varies within a quarter of the element.
@@ -128,11 +131,11 @@ class Solver {
     if (!is_cluster(link.source) && glm::dot(way, shape_.elements[link.source].flat.normal) > radius_r) return Verdict::drop;
 
     const float b = brightness(link.source, link.receiver);
-    const float source_area =
-        is_cluster(link.source) ? shape_.clusters[cluster_index(link.source)].area : shape_.elements[link.source].flat.area;
-    const float carried = b * std::min(1.0f, source_area * kInvPi / std::max(sqr(distance), 1e-12f));
-    const float error = carried * std::min(1.0f, 2 * (radius_r + radius_s) / std::max(distance, 1e-6f));
+    const float carried =
+        b * std::min(1.0f, shape_.largest_projected_area(link.source) * kInvPi / std::max(sqr(distance), 1e-12f));
     const bool larger_r = radius_r >= radius_s;
+    const bool overlapping = distance < std::max(radius_r, radius_s);  // there is no direction from one to the other
+    const float error = carried * (overlapping ? kOverlapping : std::min(1.0f, 2 * (radius_r + radius_s) / distance));
     if (error > allowed) return divided(link, larger_r);
     if (!(carried > 0)) return Verdict::keep;
     const std::uint32_t rays = rays_of(carried / allowed);
@@ -266,6 +269,13 @@ class Solver {
     pull(irradiance_, radiosity_);
   }
 
+  /// Links of few rays stay, as those that seem visible by chance do: rays are cast for them again at the end.
+  void drop_hidden() {
+    std::vector<Link> links = links_.take();
+    std::erase_if(links, [](const Link& link) { return link.visibility == 0 && link.rays >= kRaysOfHidden; });
+    links_.set(std::move(links));
+  }
+
   template <class Use>
   void for_children(NodeRef n, Use&& use) {
     if (is_cluster(n)) {
@@ -291,8 +301,7 @@ class Solver {
       const Cluster& c = shape_.clusters[i];
       float sum = 0;
       for (const NodeRef child : c.child) {
-        const float size = is_cluster(child) ? shape_.clusters[cluster_index(child)].area : shape_.elements[child].flat.area;
-        sum += size * brightness(child);
+        sum += shape_.area(child) * brightness(child);
         if (lit(child)) cluster_lit_[i] = 1;
       }
       cluster_brightness_[i] = sum / c.area;
@@ -417,17 +426,19 @@ class Solver {
     return sum;
   }
 
-  /// Irradiance in the middle of each leaf that `radiosity_` makes, over the links of the leaf and of all that it is a part of,
-  /// with form factors of and rays from that point.
+  /// Irradiance in the middle of each leaf that `radiosity_` makes, with form factors of and rays from that point; on large
+  /// leaves the mean of several points.
   std::vector<Color> gather_at_leaves() {
     find_spreads();
+    const Shine shine(shape_, context_.workers(), radiosity_);
     const std::vector<Color> one(shape_.elements.size(), Color(1));
+    const Shine even(shape_, context_.workers(), one);
     std::vector<Flow> flows(links_.size());
     std::vector<float> sums(links_.size());
     context_.workers().parallel_for(links_.size(), 64, [&](std::size_t l) {
       if (links_[l].plain()) return;
-      flows[l] = links_.flow(links_[l], radiosity_);
-      sums[l] = links_.flow(links_[l], one).flow.x;
+      flows[l] = links_.flow(links_[l], shine);
+      sums[l] = links_.flow(links_[l], even).flow.x;
     });
     std::vector<Color> found(shape_.elements.size(), Color(0));
     context_.for_chunks(found.size(), 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
@@ -435,29 +446,25 @@ class Solver {
       for (std::size_t i = begin; i < end; ++i) {
         const Element& element = shape_.elements[i];
         if (!element.leaf() || !shape_.faces[element.face].receives) continue;
-        const Receiver receiver(shape_, static_cast<std::uint32_t>(i));
-        Gathered all;
-        const auto gather = [&](NodeRef n) {
-          const Links::Range range = links_.to(n);
-          for (std::size_t l = range.first; l < range.end; ++l) {
-            const Link& link = links_[l];
-            Gathered g;
-            if (link.plain())
-              add_unoccluded(link.source, receiver, g);
-            else
-              g = unoccluded(link, flows[l], sums[l], receiver);
-            occlude(g, link, receiver, tracer);
-            all.E += g.E;
-            all.sum += g.sum;
-          }
-        };
-        for (std::uint32_t e = receiver.element; e != kNoNode; e = shape_.elements[e].parent) gather(e);
-        for (NodeRef c = shape_.faces[element.face].parent; c != kNoNode; c = shape_.clusters[cluster_index(c)].parent)
-          gather(c);
-        found[i] = correction(receiver.element, all.sum) * all.E;
+        const auto number = static_cast<std::uint32_t>(i);
+        const std::uint32_t points = points_in(element);
+        Gathered mean;
+        for (std::uint32_t k = 0; k < points; ++k) {
+          const Hierarchy::Place place =
+              points == 1 ? shape_.middle(number) : shape_.place(number, 0, sobol_point(number, 0, k));
+          const Gathered all = gather(Receiver(shape_, place), flows, sums, tracer);
+          mean.E += all.E / static_cast<float>(points);
+          mean.sum += all.sum / static_cast<float>(points);
+        }
+        found[i] = correction(number, mean.sum) * mean.E;
       }
     });
     return found;
+  }
+
+  /// The middle of a cell says enough of it, but what stands before a large one may hide things from just there.
+  static std::uint32_t points_in(const Element& element) {
+    return static_cast<std::uint32_t>(std::clamp(sqr(element.flat.radius / kSmall), 1.0f, 16.0f));
   }
 
   struct Gathered {
@@ -465,16 +472,37 @@ class Solver {
     float sum = 0;  // of form factors
   };
 
-  /// The middle of a leaf.
   struct Receiver {
-    Receiver(const Hierarchy& shape, std::uint32_t number)
-        : element(number), p(shape.center(number)), n(shape.elements[number].flat.normal) {
-      at = shape.locate(shape.place(number, shape.elements[number].domain.quad ? Vec2(0.5f) : Vec2(1.0f / 3)));
-    }
+    Receiver(const Hierarchy& shape, const Hierarchy::Place& place)
+        : element(place.element), p(place.p), n(shape.elements[place.element].flat.normal), at(shape.locate(place)) {}
     std::uint32_t element;
     Vec3 p, n;
     SurfacePosition at;
   };
+
+  /// What the links of a leaf, and of all that it is a part of, bring to a point of it.
+  Gathered gather(const Receiver& receiver, const std::vector<Flow>& flows, const std::vector<float>& sums,
+                  Tracer& tracer) const {
+    Gathered all;
+    const auto add_links = [&](NodeRef n) {
+      const Links::Range range = links_.to(n);
+      for (std::size_t l = range.first; l < range.end; ++l) {
+        const Link& link = links_[l];
+        Gathered g;
+        if (link.plain())
+          add_unoccluded(link.source, receiver, g);
+        else
+          g = unoccluded(link, flows[l], sums[l], receiver);
+        occlude(g, link, receiver, tracer);
+        all.E += g.E;
+        all.sum += g.sum;
+      }
+    };
+    for (std::uint32_t e = receiver.element; e != kNoNode; e = shape_.elements[e].parent) add_links(e);
+    NodeRef c = shape_.faces[shape_.elements[receiver.element].face].parent;
+    for (; c != kNoNode; c = shape_.clusters[cluster_index(c)].parent) add_links(c);
+    return all;
+  }
 
   /// What an element brings if nothing is in between: by its leaves where it is near, for radiosity varies over it.
   void add_unoccluded(std::uint32_t element, const Receiver& receiver, Gathered& g) const {
@@ -506,12 +534,25 @@ class Solver {
   /// factors of a source that does not shine evenly, to any.
   void occlude(Gathered& g, const Link& link, const Receiver& receiver, Tracer& tracer) const {
     if (!(g.sum > 0)) return;
-    const std::uint32_t rays = rays_of(brightness(link.source, link.receiver) * g.sum / (options_.error * mean_));
+    const float importance = brightness(link.source, link.receiver) * g.sum / (options_.error * mean_);
+    if (!link.plain() && kRaysOfError * importance < 1) return occlude_at_random(g, link, receiver, importance, tracer);
+    const std::uint32_t rays = rays_of(importance);
     const float visible = visible_share(link, receiver, rays, true, tracer);
     const bool even = is_cluster(link.source) || spread_[link.source] <= kEven * max_component(radiosity_[link.source]);
     const bool closed = shape_.faces[shape_.elements[receiver.element].face].enclosed;
     g.E *= visible;
     g.sum *= even || !closed ? visible : visible_share(link, receiver, rays, false, tracer);
+  }
+
+  /// The same for a link that would deserve a part of a ray: some get a whole one, which then counts for others, too; they all
+  /// start from what the link is known to see.
+  void occlude_at_random(Gathered& g, const Link& link, const Receiver& receiver, float importance, Tracer& tracer) const {
+    const float chance = kRaysOfError * importance;
+    float visible = link.visibility;
+    if (to_unit_float(hash32(receiver.element, hash32(link.receiver, link.source))) < chance)
+      visible += (visible_share(link, receiver, 1, true, tracer) - visible) / chance;
+    g.E *= visible;
+    g.sum *= visible;
   }
 
   float visible_share(const Link& link, const Receiver& receiver, std::uint32_t rays, bool bright, Tracer& tracer) const {

@@ -21,6 +21,7 @@ Hierarchy::Hierarchy(PrepareContext& context, NodeId node, const QuadTree& in, c
     elements[i].flat = make_flat_cell(patches_.surface(faces[i].id / 2), Patches::is_front(faces[i].id));
   if (faces.size() > 1) build(order, 0, static_cast<std::uint32_t>(faces.size()), kNoNode);
   add_elements(in);
+  sum_up_lobes();
   measure_albedo(0);
 }
 
@@ -36,7 +37,7 @@ void Hierarchy::find_faces(NodeId node, const QuadTree& in, const RadiosityOptio
     tracer.enter(node);
     for (auto face = static_cast<std::uint32_t>(begin); face < end; ++face) {
       const std::uint32_t patch = face / 2;
-      const float size = area(patches_.surface(patch));
+      const float size = ln::area(patches_.surface(patch));
       if (!(size > 0)) continue;
       const std::uint32_t rays = std::clamp(static_cast<std::uint32_t>(size / kAreaOfRay), kFewest, kMost);
       const std::uint32_t key = hash32(face, node);
@@ -67,7 +68,7 @@ void Hierarchy::find_faces(NodeId node, const QuadTree& in, const RadiosityOptio
   for (std::uint32_t face = 0; face < count; ++face)
     if (in.lit(face)) lit[sets.find(face)] = 1;
   for (std::uint32_t face = 0; face < count; ++face)
-    if (lit[sets.find(face)] && area(patches_.surface(face / 2)) > 0) add_face(face, options);
+    if (lit[sets.find(face)] && ln::area(patches_.surface(face / 2)) > 0) add_face(face, options);
 }
 
 void Hierarchy::add_face(std::uint32_t id, const RadiosityOptions& options) {
@@ -143,6 +144,48 @@ NodeRef Hierarchy::build(std::vector<std::uint32_t>& order, std::uint32_t begin,
     faces = std::move(sorted);
   }
   return self;
+}
+
+/// Clusters of more faces than that are large: their faces are looked at together.
+constexpr std::uint32_t kMostSingle = 32;
+
+void Hierarchy::sum_up_lobes() {
+  for (std::uint32_t i = 0; i < faces.size(); ++i) {
+    const FlatCell& flat = elements[i].flat;
+    area_normals.push_back(flat.area * flat.normal);
+    lobe_of_face.push_back(static_cast<std::uint8_t>(lobe_of(flat.normal)));
+  }
+  for (std::uint32_t i = 0; i < clusters.size(); ++i) {
+    Cluster& c = clusters[i];
+    if (c.count <= kMostSingle) continue;
+    c.lobes = static_cast<std::uint32_t>(lobes.size());
+    lobes.push_back({.cluster = i});
+  }
+  context_.workers().parallel_for(lobes.size(), 1, [&](std::size_t k) {
+    Lobes& sums = lobes[k];
+    const Cluster& c = clusters[sums.cluster];
+    for (std::uint32_t i = c.first; i < c.first + c.count; ++i) {
+      sums.area_normal[lobe_of_face[i]] += area_normals[i];
+      sums.area[lobe_of_face[i]] += elements[i].flat.area;
+    }
+  });
+  context_.workers().parallel_for(clusters.size(), 16, [&](std::size_t i) {
+    float& largest = clusters[i].largest_projected_area;
+    for (std::uint32_t lobe = 0; lobe < kLobes; ++lobe)
+      largest = std::max(largest, projected_area(static_cast<NodeRef>(i) | kClusterBit, lobe_axis(lobe)));
+  });
+}
+
+float Hierarchy::projected_area(NodeRef n, const Vec3& direction) const {
+  if (!is_cluster(n)) return std::max(0.0f, glm::dot(elements[n].flat.normal, direction)) * elements[n].flat.area;
+  const Cluster& c = clusters[cluster_index(n)];
+  float sum = 0;
+  if (c.lobes != kNoNode) {
+    for (const Vec3& lobe : lobes[c.lobes].area_normal) sum += std::max(0.0f, glm::dot(lobe, direction));
+  } else {
+    for (std::uint32_t i = c.first; i < c.first + c.count; ++i) sum += std::max(0.0f, glm::dot(area_normals[i], direction));
+  }
+  return sum;
 }
 
 /// Cells of the input, and the sums of areas.

@@ -5,6 +5,7 @@
 // They are numbered by their places in the tree of clusters, so that a cluster holds a run of them; face i has element i as its
 // whole.
 
+#include <cmath>
 #include <vector>
 
 #include "ln/form_factor.hpp"
@@ -47,10 +48,35 @@ struct Element {
 struct Cluster {
   Vec3 center{0};
   float radius = 0, area = 0;
+  float largest_projected_area = 0;
   std::uint32_t first = 0, count = 0;  // faces
   NodeRef child[2] = {kNoNode, kNoNode};
   NodeRef parent = kNoNode;
+  std::uint32_t lobes = kNoNode;  // number of its Lobes, if it is a large one
   bool receives = false;
+};
+
+/// Directions are told apart by their largest component and all signs.
+inline constexpr std::uint32_t kLobes = 24;
+inline std::uint32_t lobe_of(const Vec3& d) {
+  const Vec3 size(std::abs(d.x), std::abs(d.y), std::abs(d.z));
+  const std::uint32_t axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  return axis * 8 + (d.x < 0 ? 4u : 0u) + (d.y < 0 ? 2u : 0u) + (d.z < 0 ? 1u : 0u);
+}
+/// A direction in the middle of them.
+inline Vec3 lobe_axis(std::uint32_t lobe) {
+  Vec3 d(0.41f);
+  d[static_cast<int>(lobe / 8)] = 1;
+  for (int axis = 0; axis < 3; ++axis)
+    if (lobe & 4u >> axis) d[axis] = -d[axis];
+  return glm::normalize(d);
+}
+
+/// The faces of a large cluster, summed up by the directions of their normals.
+struct Lobes {
+  std::uint32_t cluster = 0;
+  Vec3 area_normal[kLobes] = {};  // sum of areas times normals
+  float area[kLobes] = {};
 };
 
 class Hierarchy {
@@ -62,6 +88,13 @@ class Hierarchy {
 
   Vec3 center(NodeRef n) const { return is_cluster(n) ? clusters[cluster_index(n)].center : elements[n].flat.cell.center(); }
   float radius(NodeRef n) const { return is_cluster(n) ? clusters[cluster_index(n)].radius : elements[n].flat.radius; }
+  float area(NodeRef n) const { return is_cluster(n) ? clusters[cluster_index(n)].area : elements[n].flat.area; }
+  /// Sum of the areas that are seen from far off in `direction`, also one behind the other.
+  float projected_area(NodeRef n, const Vec3& direction) const;
+  /// The same for the direction where it is largest, about.
+  float largest_projected_area(NodeRef n) const {
+    return is_cluster(n) ? clusters[cluster_index(n)].largest_projected_area : elements[n].flat.area;
+  }
   bool receives(NodeRef n) const {
     return is_cluster(n) ? clusters[cluster_index(n)].receives : faces[elements[n].face].receives;
   }
@@ -88,18 +121,25 @@ class Hierarchy {
     const SurfaceCell& cell = elements[element].flat.cell;
     return {element, st, cell.o + st.x * cell.a + st.y * cell.b};
   }
+  Place middle(std::uint32_t element) const {
+    return place(element, elements[element].domain.quad ? Vec2(0.5f) : Vec2(1.0f / 3));
+  }
   /// For rays from there.
   SurfacePosition locate(const Place& place) const;
 
   std::vector<Face> faces;
   std::vector<Element> elements;
-  std::vector<Cluster> clusters;
+  std::vector<Cluster> clusters;   // behind their parents
+  std::vector<Vec3> area_normals;  // by face
+  std::vector<std::uint8_t> lobe_of_face;
+  std::vector<Lobes> lobes;  // of large clusters, in their order
 
  private:
   void find_faces(NodeId node, const QuadTree& in, const RadiosityOptions& options);
   void add_face(std::uint32_t id, const RadiosityOptions& options);
   NodeRef build(std::vector<std::uint32_t>& order, std::uint32_t begin, std::uint32_t end, NodeRef parent);
   void add_elements(const QuadTree& in);
+  void sum_up_lobes();
 
   PrepareContext& context_;
   const Patches& patches_;

@@ -1,6 +1,7 @@
 #pragma once
 // What light goes over between the cells and clusters of radiosity.
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -28,6 +29,20 @@ struct Flow {
   Color flow;
 };
 
+/// What elements shine, and large clusters all together.
+class Shine {
+ public:
+  Shine(const Hierarchy& shape, Workers& workers, const std::vector<Color>& radiosity);
+
+  /// Intensity [W/sr] times pi, if nothing hides anything.
+  Color towards(NodeRef n, const Vec3& direction) const;
+
+ private:
+  const Hierarchy& shape_;
+  const std::vector<Color>& radiosity_;
+  std::vector<std::array<Color, kLobes>> lobes_;  // mean radiosity, by large cluster
+};
+
 /// The links of a hierarchy: those of elements first, in order of receivers.
 class Links {
  public:
@@ -48,7 +63,7 @@ class Links {
     return {first[i], first[i + 1]};
   }
 
-  Flow flow(const Link& link, const std::vector<Color>& radiosity) const;
+  Flow flow(const Link& link, const Shine& shine) const;
 
   /// Irradiance on each element that `radiosity` makes.
   std::vector<Color> transport(Workers& workers, const std::vector<Color>& radiosity) const;

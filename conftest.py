@@ -149,6 +149,32 @@ def runtime_tool(runtime_build: Path, request: pytest.FixtureRequest) -> Callabl
     return tool
 
 
+@pytest.fixture(scope="session")
+def unit_test(runtime_tool: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory) -> Callable[..., None]:
+    """unit_test("test_quad_tree"): its C++ tests pass; they run once a session. Options of doctest pick some of them."""
+
+    @cache
+    def run(name: str, *options: str) -> subprocess.CompletedProcess[str]:
+        folder = tmp_path_factory.mktemp(name)
+        return subprocess.run(
+            [runtime_tool(name), *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            cwd=folder,
+            env={**os.environ, "TMPDIR": str(folder)},
+            timeout=900,
+            check=False,
+        )
+
+    def check(name: str, *options: str) -> None:
+        done = run(name, *options)
+        assert done.returncode == 0 and "| 0 passed" not in done.stdout, done.stdout[-20_000:]
+
+    return check
+
+
 COMPILES = {"compiled_network", "runtime_build"}
 
 

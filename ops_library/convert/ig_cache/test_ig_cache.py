@@ -1,6 +1,5 @@
 """IGCache: its octree and its series of bounces (in C++); the same bits with any number of threads; what it costs."""
 
-import subprocess
 import sys
 from pathlib import Path
 
@@ -46,9 +45,8 @@ def run(compiled_network, run_program):
     return run
 
 
-def test_known_answers(runtime_tool):
-    done = subprocess.run([runtime_tool("test_irradiance_records")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+def test_known_answers(unit_test):
+    unit_test("test_irradiance_records")
 
 
 def test_the_seed_decides_not_the_threads(run):

@@ -1,6 +1,5 @@
 """IGSampler: gradients against finite differences (in C++), and irradiance of which nothing is interpolated."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -10,9 +9,8 @@ from benchmarks import exr
 SCENES = Path(__file__).resolve().parents[3] / "examples" / "scenes"
 
 
-def test_known_answers(runtime_tool):
-    done = subprocess.run([runtime_tool("test_hemisphere")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+def test_known_answers(unit_test):
+    unit_test("test_hemisphere")
 
 
 def test_furnace(compiled_network, run_program):

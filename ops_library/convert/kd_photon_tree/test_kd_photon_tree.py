@@ -1,14 +1,12 @@
 """KDPhotonTree: it finds what a search of all photons finds (in C++), and is inserted where it is left out."""
 
-import subprocess
 from pathlib import Path
 
 SCENES = Path(__file__).resolve().parents[3] / "examples" / "scenes"
 
 
-def test_known_answers(runtime_tool):
-    done = subprocess.run([runtime_tool("test_photon_map")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+def test_known_answers(unit_test):
+    unit_test("test_photon_map")
 
 
 def test_inserted_or_written_out_it_is_the_same(compiled_network, run_program):

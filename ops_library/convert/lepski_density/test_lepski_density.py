@@ -1,6 +1,5 @@
 """LepskiDensity: closed forms (in C++), agreement with path tracing in a closed room, and less error than NNDensity."""
 
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +19,8 @@ image   density
 """
 
 
-def test_known_answers(runtime_tool):
-    done = subprocess.run([runtime_tool("test_photon_bandwidth")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+def test_known_answers(unit_test):
+    unit_test("test_photon_bandwidth")
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """NNDensity: closed forms (in C++), and agreement with path tracing in a closed diffuse room, corners included."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -10,9 +9,8 @@ SCENES = Path(__file__).resolve().parents[3] / "examples" / "scenes"
 exr = pytest.importorskip("benchmarks.exr")
 
 
-def test_known_answers(runtime_tool):
-    done = subprocess.run([runtime_tool("test_photon_density")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+def test_known_answers(unit_test):
+    unit_test("test_photon_density")
 
 
 def picture(run_program, program, *options):

@@ -1,6 +1,5 @@
 """PhotonSurfSort: known answers (in C++), and it is inserted where it is left out."""
 
-import subprocess
 from pathlib import Path
 
 SCENES = Path(__file__).resolve().parents[3] / "examples" / "scenes"
@@ -15,10 +14,8 @@ image   mesh
 """
 
 
-def test_known_answers(runtime_tool):
-    command = [runtime_tool("test_photon_mesh"), "--test-case=photons are sorted*"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and "1 passed" in done.stdout, done.stdout
+def test_known_answers(unit_test):
+    unit_test("test_photon_mesh", "--test-case=photons are sorted*")
 
 
 def test_inserted_or_written_out_it_is_the_same(compiled_network, run_program):

@@ -3,7 +3,6 @@
 import csv
 import itertools
 import math
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -26,9 +25,8 @@ def picture(run_program, program, *options, scene="plane_area.gltf"):
     return exr.read(run.picture)
 
 
-def test_known_answers(runtime_tool):
-    done = subprocess.run([runtime_tool("test_quad_tree")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+def test_known_answers(unit_test):
+    unit_test("test_quad_tree")
 
 
 def test_the_picture_is_that_of_the_samples(compiled_network, run_program):

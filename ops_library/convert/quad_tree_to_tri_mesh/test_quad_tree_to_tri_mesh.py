@@ -1,6 +1,5 @@
 """QuadTreeToTriMesh: exactness and continuity (in C++), and that it smooths without changing the mean."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -18,9 +17,8 @@ tap   cells -> "cells.exr"
 """
 
 
-def test_known_answers(runtime_tool):
-    done = subprocess.run([runtime_tool("test_quad_tree")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+def test_known_answers(unit_test):
+    unit_test("test_quad_tree")
 
 
 def test_nearer_to_the_light_than_its_cells(compiled_network, run_program):

@@ -1,6 +1,5 @@
 """TriMeshReducer: its bound (in C++), and that it is kept from program to picture."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -19,10 +18,8 @@ image   mesh
 """
 
 
-def test_known_answers(runtime_tool):
-    command = [runtime_tool("test_photon_mesh"), "--test-case=a reduced*"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and "1 passed" in done.stdout, done.stdout
+def test_known_answers(unit_test):
+    unit_test("test_photon_mesh", "--test-case=a reduced*")
 
 
 def test_the_error_is_bounded_in_the_picture(compiled_network, run_program):

@@ -1,6 +1,5 @@
 """ParticleTracer: its ledger, energy and path expressions (in C++), and the photon rays of a whole program."""
 
-import subprocess
 from pathlib import Path
 
 SCENES = Path(__file__).resolve().parents[3] / "examples" / "scenes"
@@ -15,9 +14,8 @@ image   density
 """
 
 
-def test_known_answers(runtime_tool):
-    done = subprocess.run([runtime_tool("test_photon_tracer")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+def test_known_answers(unit_test):
+    unit_test("test_photon_tracer")
 
 
 def photon_rays(compiled_network, run_program, name, via, *options):

@@ -1,6 +1,5 @@
 """Radiosity: closed forms (in C++), and agreement with path tracing in two rooms."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -17,17 +16,13 @@ def picture(run_program, program, *options, scene="cornell_box.gltf"):
 
 
 @pytest.mark.parametrize("unit", ["test_form_factor", "test_radiosity"])
-def test_known_answers(runtime_tool, unit):
-    done = subprocess.run([runtime_tool(unit)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+def test_known_answers(unit_test, unit):
+    unit_test(unit)
 
 
 @pytest.mark.slow
-def test_known_answers_of_many_surfaces(runtime_tool):
-    tool = runtime_tool("test_radiosity")
-    done = subprocess.run([tool, "--no-skip", "--test-case=slow*"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
-    assert "| 0 passed" not in done.stdout
+def test_known_answers_of_many_surfaces(unit_test):
+    unit_test("test_radiosity", "--no-skip", "--test-case=slow*")
 
 
 @pytest.mark.parametrize("scene", ["cornell_box.gltf", "closed_box.gltf"])

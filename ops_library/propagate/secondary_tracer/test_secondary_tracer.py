@@ -1,6 +1,5 @@
 """SecondaryTracer: closed forms (in C++), and whole programs that carry the same light by other ways."""
 
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -19,10 +18,8 @@ image  {image}
 """
 
 
-def test_known_answers(runtime_tool):
-    command = [runtime_tool("test_photon_tracer"), "--test-case=secondary*"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0 and " 0 failed" in done.stdout and " 0 passed" not in done.stdout, done.stdout
+def test_known_answers(unit_test):
+    unit_test("test_photon_tracer", "--test-case=secondary*")
 
 
 def mean(compiled_network, run_program, name, equations, image, scene, samples):

@@ -151,7 +151,7 @@ def runtime_tool(runtime_build: Path, request: pytest.FixtureRequest) -> Callabl
 
 @pytest.fixture(scope="session")
 def unit_test(runtime_tool: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory) -> Callable[..., None]:
-    """unit_test("test_quad_tree"): its C++ tests pass; they run once a session. Options of doctest pick some of them."""
+    """unit_test("test_quad_tree"): its C++ tests pass; they run once a session. Options of doctest pick some."""
 
     @cache
     def run(name: str, *options: str) -> subprocess.CompletedProcess[str]:

@@ -6,7 +6,7 @@
 #include "ln/emitter_shapes.hpp"
 #include "ln/error.hpp"
 #include "ln/stats.hpp"
-#include "radiosity_links.hpp"
+#include "radiosity_gatherer.hpp"
 
 namespace ln {
 
@@ -16,12 +16,6 @@ namespace {
 
 enum class Verdict : std::uint8_t { drop, keep, divide_receiver, divide_source };
 
-constexpr std::uint32_t kMostRays = 16;
-/// Rays of a link that carries as much as it may err.
-constexpr float kRaysOfError = 4;
-/// A dark surface counts as this bright, in means of the radiosity, where light arrives: its form factors are needed for the
-/// sum of all, which is known.
-constexpr float kDarkest = 1;
 /// Weight of errors from uneven sources: unlike others they have mostly the same sign, since bright places are near to each
 /// other.
 constexpr float kSourceWeight = 4;
@@ -35,14 +29,6 @@ constexpr std::uint32_t kRaysOfHidden = 8;
 constexpr float kFaintest = 1e-3f;
 /// Gathers at leaves: each leaves a few percent of the error that was there before.
 constexpr int kGathers = 2;
-/// Sums of form factors are corrected by no more than this.
-constexpr float kLargestCorrection = 1.5f;
-/// A source whose leaves differ from its mean by less than this share shines evenly.
-constexpr float kEven = 0.1f;
-/// Gathering goes down to cells of this radius, as a share of the distance; those of less than kFar count as points.
-constexpr float kResolved = 0.12f, kFar = 0.08f;
-/// Leaves of a larger radius, in half diagonals of the scene, gather at several points.
-constexpr float kSmall = 1.0f / 16;
 /// Residual of iterations whose result is not the last one.
 constexpr float kRoughly = 0.03f;
 
@@ -54,22 +40,23 @@ class Solver {
         options_(options),
         shape_(context, node, in, options),
         patches_(in.shared_patches()),
-        links_(shape_) {}
+        links_(shape_),
+        light_(shape_) {}
 
   QuadTree run(RadiosityReport& report) {
     if (shape_.empty()) return QuadTree(patches_);
-    irradiance_ = sources();
-    pull(irradiance_, radiosity_);
+    light_.irradiance = sources();
+    light_.pull();
     links_.set({{shape_.root(), shape_.root()}});
     // From coarse to fine: what is bright is known before anything is resolved.
     constexpr float kCoarser[] = {8, 3, 1};
     for (const float coarser : kCoarser) {
-      if (!(mean_radiosity() > 0)) return QuadTree(patches_);
-      refine(coarser * options_.error * mean_);
+      if (!(light_.find_mean() > 0)) return QuadTree(patches_);
+      refine(coarser * options_.error * light_.mean);
       if (coarser == 1) drop_hidden();
       correct_sums();
-      report.residual = iterate(sources(), irradiance_, coarser > 1 ? kRoughly : options_.residual, report);
-      pull(irradiance_, radiosity_);
+      report.residual = iterate(sources(), light_.irradiance, coarser > 1 ? kRoughly : options_.residual, report);
+      light_.pull();
     }
     report.elements = shape_.elements.size();
     report.links = links_.size();
@@ -79,14 +66,6 @@ class Solver {
 
  private:
   // --- Links ----------------------------------------------------------------------------------------------------------------
-
-  float brightness(NodeRef source, NodeRef receiver) const {
-    return std::max(brightness(source), lit(receiver) ? kDarkest * mean_ : 0.0f);
-  }
-  float brightness(NodeRef n) const {
-    return is_cluster(n) ? cluster_brightness_[cluster_index(n)] : max_component(radiosity_[n]);
-  }
-  bool lit(NodeRef n) const { return is_cluster(n) ? cluster_lit_[cluster_index(n)] != 0 : !is_black(irradiance_[n]); }
 
   Verdict judge(Link& link, float allowed, Tracer& tracer) const {
     return link.plain() ? judge_elements(link, allowed, tracer) : judge_clusters(link, allowed, tracer);
@@ -98,7 +77,7 @@ class Solver {
     const FormFactor f = form_factor(r.flat, s.flat);
     if (!(f.mean > 0) && !(f.spread > 0)) return Verdict::drop;
     const bool divide_r = shape_.divisible(link.receiver), divide_s = shape_.divisible(link.source);
-    const float b = brightness(link.source, link.receiver);
+    const float b = light_.brightness(link.source, link.receiver);
     const float distance = glm::distance(r.flat.cell.center(), s.flat.cell.center());
     const float error_r = b * f.spread;
     const float error_s = kSourceWeight * f.mean * quarter_spread(s) * std::min(1.0f, s.flat.radius / distance);
@@ -118,7 +97,7 @@ class Solver {
   /// How much the radiosity varies within a quarter of the element.
   float quarter_spread(const Element& e) const {
     float spread = 0;
-    for (std::uint32_t c = e.children; c < e.children + 4 && !e.leaf(); ++c) spread = std::max(spread, spread_[c]);
+    for (std::uint32_t c = e.children; c < e.children + 4 && !e.leaf(); ++c) spread = std::max(spread, light_.spread[c]);
     return spread;
   }
 
@@ -130,7 +109,7 @@ class Solver {
       return Verdict::drop;
     if (!is_cluster(link.source) && glm::dot(way, shape_.elements[link.source].flat.normal) > radius_r) return Verdict::drop;
 
-    const float b = brightness(link.source, link.receiver);
+    const float b = light_.brightness(link.source, link.receiver);
     const float carried =
         b * std::min(1.0f, shape_.largest_projected_area(link.source) * kInvPi / std::max(sqr(distance), 1e-12f));
     const bool larger_r = radius_r >= radius_s;
@@ -151,11 +130,6 @@ class Solver {
     return can_r && (receiver_first || !can_s) ? Verdict::divide_receiver : Verdict::divide_source;
   }
 
-  /// Number of rays for a link that carries so many times what it may err.
-  static std::uint32_t rays_of(float importance) {
-    return static_cast<std::uint32_t>(std::clamp(kRaysOfError * importance, 1.0f, static_cast<float>(kMostRays)));
-  }
-
   /// Does the link err too much as one whose ends see each other in part?
   bool partly_hidden(const Link& link, std::uint32_t rays, float importance, Tracer& tracer) const {
     if (importance <= 2) return false;
@@ -169,14 +143,6 @@ class Solver {
     if (link.rays >= rays) return;
     link.visibility = visibility(link, 1, rays, tracer);
     link.rays = rays;
-  }
-
-  /// Mean radiosity of the leaf that a point lies in.
-  float brightness(const Hierarchy::Place& place) const {
-    std::uint32_t e = place.element;
-    for (Vec2 st = place.st; !shape_.elements[e].leaf();)
-      e = shape_.elements[e].children + static_cast<std::uint32_t>(descend(shape_.elements[e].domain.quad, st));
-    return mean_component(radiosity_[e]);
   }
 
   /// Visibility by a number of rays between pairs of points, which are picked from several times as many by what they exchange:
@@ -214,7 +180,7 @@ class Solver {
         to[i] = shape_.place(link.source, point.pick.y, point.v);
       }
       const Vec3 way = to[i].p - from[i].p;
-      const float weight = plain ? std::max(kFaintest * mean_, brightness(to[i])) : 1.0f;
+      const float weight = plain ? std::max(kFaintest * light_.mean, light_.brightness(to[i])) : 1.0f;
       const float facing_r = glm::dot(way, shape_.elements[from[i].element].flat.normal),
                   facing_s = -glm::dot(way, shape_.elements[to[i].element].flat.normal), distance2 = glm::dot(way, way);
       if (facing_r > 0 && facing_s > 0 && density > 0)
@@ -238,8 +204,8 @@ class Solver {
 
   /// Replaces links that may err by more than `allowed` [W/m^2].
   void refine(float allowed) {
-    find_spreads();
-    summarise_clusters();
+    light_.find_spreads();
+    light_.summarise_clusters();
     const std::size_t known = shape_.elements.size();
     const std::size_t limit = available_memory_bytes() / 3 / (4 * sizeof(Link));
     std::vector<Link> open = links_.take(), kept;
@@ -266,7 +232,7 @@ class Solver {
     }
     links_.set(std::move(kept));
     shape_.measure_albedo(known);
-    pull(irradiance_, radiosity_);
+    light_.pull();
   }
 
   /// Links of few rays stay, as those that seem visible by chance do: rays are cast for them again at the end.
@@ -285,27 +251,9 @@ class Solver {
     }
     if (shape_.elements[n].leaf()) {
       shape_.divide(n);
-      const std::size_t count = shape_.elements.size();
-      radiosity_.resize(count, radiosity_[n]);
-      irradiance_.resize(count, irradiance_[n]);
-      spread_.resize(count, 0.0f);
+      light_.add_children_of(n);
     }
     for (std::uint32_t c = 0; c < 4; ++c) use(shape_.elements[n].children + c);
-  }
-
-  /// Mean brightness and whether any light arrives, by cluster.
-  void summarise_clusters() {
-    cluster_brightness_.assign(shape_.clusters.size(), 0);
-    cluster_lit_.assign(shape_.clusters.size(), 0);
-    for (std::size_t i = shape_.clusters.size(); i-- > 0;) {
-      const Cluster& c = shape_.clusters[i];
-      float sum = 0;
-      for (const NodeRef child : c.child) {
-        sum += shape_.area(child) * brightness(child);
-        if (lit(child)) cluster_lit_[i] = 1;
-      }
-      cluster_brightness_[i] = sum / c.area;
-    }
   }
 
   // --- Solution -------------------------------------------------------------------------------------------------------------
@@ -318,55 +266,11 @@ class Solver {
     return irradiance;
   }
 
-  /// Radiosity of the leaves from their irradiance; means of both for all others.
-  void pull(std::vector<Color>& irradiance, std::vector<Color>& radiosity) const {
-    const std::size_t count = shape_.elements.size();
-    radiosity.resize(count);
-    for (std::size_t i = count; i-- > 0;) {
-      const Element& e = shape_.elements[i];
-      if (e.leaf()) {
-        radiosity[i] = e.albedo * irradiance[i];
-        continue;
-      }
-      radiosity[i] = irradiance[i] = Color(0);
-      for (std::uint32_t c = e.children; c < e.children + 4; ++c) {
-        radiosity[i] += 0.25f * radiosity[c];
-        irradiance[i] += 0.25f * irradiance[c];
-      }
-    }
-  }
-
-  void find_spreads() {
-    spread_.assign(shape_.elements.size(), 0.0f);
-    for (std::size_t i = spread_.size(); i-- > 0;) {
-      const Element& e = shape_.elements[i];
-      for (std::uint32_t c = e.children; c < e.children + 4 && !e.leaf(); ++c)
-        spread_[i] = std::max(spread_[i], max_component(glm::abs(radiosity_[c] - radiosity_[i])) + spread_[c]);
-    }
-  }
-
-  /// Area mean of the radiosity, of its brightest channel.
-  float mean_radiosity() {
-    double sum = 0, whole = 0;
-    for (std::size_t i = 0; i < shape_.faces.size(); ++i) {
-      const auto a = static_cast<double>(shape_.elements[i].flat.area);
-      sum += a * static_cast<double>(max_component(radiosity_[i]));
-      whole += a;
-    }
-    mean_ = static_cast<float>(sum / whole);
-    return mean_;
-  }
-
-  /// Form factors of a cell add up to 1 where its face sees nothing but surfaces, and nowhere to more.
   void correct_sums() {
     correction_.clear();
     const std::vector<Color> sums = links_.transport(context_.workers(), std::vector<Color>(shape_.elements.size(), Color(1)));
-    for (const Color& sum : sums) correction_.push_back(correction(static_cast<std::uint32_t>(correction_.size()), sum.x));
-  }
-  float correction(std::uint32_t element, float sum) const {
-    if (!(sum > 0)) return 1;
-    const bool closed = shape_.faces[shape_.elements[element].face].enclosed;
-    return std::clamp(1 / sum, 1 / kLargestCorrection, closed ? kLargestCorrection : 1.0f);
+    for (const Color& sum : sums)
+      correction_.push_back(sum_correction(shape_, static_cast<std::uint32_t>(correction_.size()), sum.x));
   }
 
   /// Jacobi iteration of E = added + K rho E for the leaves, K by links, until what is still to come is less than `residual` of
@@ -376,7 +280,7 @@ class Solver {
     std::vector<Color> radiosity;
     double before = 0, to_come = 0;
     for (std::int64_t i = 0; i < options_.iterations; ++i) {
-      pull(irradiance, radiosity);
+      light_.pull(irradiance, radiosity);
       std::vector<Color> next = links_.transport(context_.workers(), radiosity);
       double change = 0, size = 0;
       for (std::size_t k = 0; k < next.size(); ++k) {
@@ -402,21 +306,20 @@ class Solver {
     return static_cast<double>(e.flat.area) * static_cast<double>(size.x + size.y + size.z);
   }
 
-  // --- Gathering ------------------------------------------------------------------------------------------------------------
-
   /// Deferred correction: gathers once more, at points, and lets links transport only what that has changed. A link is wrong
   /// in the same way all over its receiver; so are its errors' errors, but they are small.
   void correct(RadiosityReport& report) {
-    std::vector<Color> change = gather_at_leaves();
+    light_.find_spreads();
+    std::vector<Color> change = Gatherer(context_, node_, shape_, links_, light_, options_.error * light_.mean).at_leaves();
     const double size = total(change);
     for (std::size_t i = 0; i < change.size(); ++i)
-      change[i] = shape_.elements[i].leaf() ? change[i] + shape_.elements[i].source - irradiance_[i] : Color(0);
+      change[i] = shape_.elements[i].leaf() ? change[i] + shape_.elements[i].source - light_.irradiance[i] : Color(0);
     const std::vector<Color> added = change;
     iterate(added, change, kRoughly, report);
     report.correction = size > 0 ? total(change) / size : 0;
     for (std::size_t i = 0; i < change.size(); ++i)
-      irradiance_[i] = glm::max(irradiance_[i] + change[i], shape_.elements[i].source);
-    pull(irradiance_, radiosity_);
+      light_.irradiance[i] = glm::max(light_.irradiance[i] + change[i], shape_.elements[i].source);
+    light_.pull();
   }
   /// Flux on the leaves, without regard to signs.
   double total(const std::vector<Color>& irradiance) const {
@@ -426,176 +329,12 @@ class Solver {
     return sum;
   }
 
-  /// Irradiance in the middle of each leaf that `radiosity_` makes, with form factors of and rays from that point; on large
-  /// leaves the mean of several points.
-  std::vector<Color> gather_at_leaves() {
-    find_spreads();
-    const Shine shine(shape_, context_.workers(), radiosity_);
-    const std::vector<Color> one(shape_.elements.size(), Color(1));
-    const Shine even(shape_, context_.workers(), one);
-    std::vector<Flow> flows(links_.size());
-    std::vector<float> sums(links_.size());
-    context_.workers().parallel_for(links_.size(), 64, [&](std::size_t l) {
-      if (links_[l].plain()) return;
-      flows[l] = links_.flow(links_[l], shine);
-      sums[l] = links_.flow(links_[l], even).flow.x;
-    });
-    std::vector<Color> found(shape_.elements.size(), Color(0));
-    context_.for_chunks(found.size(), 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
-      tracer.enter(node_);
-      for (std::size_t i = begin; i < end; ++i) {
-        const Element& element = shape_.elements[i];
-        if (!element.leaf() || !shape_.faces[element.face].receives) continue;
-        const auto number = static_cast<std::uint32_t>(i);
-        const std::uint32_t points = points_in(element);
-        Gathered mean;
-        for (std::uint32_t k = 0; k < points; ++k) {
-          const Hierarchy::Place place =
-              points == 1 ? shape_.middle(number) : shape_.place(number, 0, sobol_point(number, 0, k));
-          const Gathered all = gather(Receiver(shape_, place), flows, sums, tracer);
-          mean.E += all.E / static_cast<float>(points);
-          mean.sum += all.sum / static_cast<float>(points);
-        }
-        found[i] = correction(number, mean.sum) * mean.E;
-      }
-    });
-    return found;
-  }
-
-  /// The middle of a cell says enough of it, but what stands before a large one may hide things from just there.
-  static std::uint32_t points_in(const Element& element) {
-    return static_cast<std::uint32_t>(std::clamp(sqr(element.flat.radius / kSmall), 1.0f, 16.0f));
-  }
-
-  struct Gathered {
-    Color E{0};
-    float sum = 0;  // of form factors
-  };
-
-  struct Receiver {
-    Receiver(const Hierarchy& shape, const Hierarchy::Place& place)
-        : element(place.element), p(place.p), n(shape.elements[place.element].flat.normal), at(shape.locate(place)) {}
-    std::uint32_t element;
-    Vec3 p, n;
-    SurfacePosition at;
-  };
-
-  /// What the links of a leaf, and of all that it is a part of, bring to a point of it.
-  Gathered gather(const Receiver& receiver, const std::vector<Flow>& flows, const std::vector<float>& sums,
-                  Tracer& tracer) const {
-    Gathered all;
-    const auto add_links = [&](NodeRef n) {
-      const Links::Range range = links_.to(n);
-      for (std::size_t l = range.first; l < range.end; ++l) {
-        const Link& link = links_[l];
-        Gathered g;
-        if (link.plain())
-          add_unoccluded(link.source, receiver, g);
-        else
-          g = unoccluded(link, flows[l], sums[l], receiver);
-        occlude(g, link, receiver, tracer);
-        all.E += g.E;
-        all.sum += g.sum;
-      }
-    };
-    for (std::uint32_t e = receiver.element; e != kNoNode; e = shape_.elements[e].parent) add_links(e);
-    NodeRef c = shape_.faces[shape_.elements[receiver.element].face].parent;
-    for (; c != kNoNode; c = shape_.clusters[cluster_index(c)].parent) add_links(c);
-    return all;
-  }
-
-  /// What an element brings if nothing is in between: by its leaves where it is near, for radiosity varies over it.
-  void add_unoccluded(std::uint32_t element, const Receiver& receiver, Gathered& g) const {
-    const Element& e = shape_.elements[element];
-    const Vec3 way = e.flat.cell.center() - receiver.p;
-    const float distance = glm::length(way), facing = glm::dot(way, receiver.n);
-    if (!e.leaf() && e.flat.radius > kResolved * distance) {
-      for (std::uint32_t c = 0; c < 4; ++c) add_unoccluded(e.children + c, receiver, g);
-      return;
-    }
-    const bool far = e.flat.radius < kFar * distance && facing > e.flat.radius;
-    const float f = far ? facing * std::max(0.0f, -glm::dot(way, e.flat.normal)) * e.flat.area * kInvPi / sqr(sqr(distance))
-                        : point_form_factor(receiver.p, receiver.n, e.flat);
-    g.E += f * radiosity_[element];
-    g.sum += f;
-  }
-
-  /// The same of a link to or from a cluster, which brings `flow`, `sum` of form factors, to the center of its receiver.
-  Gathered unoccluded(const Link& link, const Flow& flow, float sum, const Receiver& receiver) const {
-    const Vec3 source = shape_.center(link.source), way = source - receiver.p;
-    const float facing = glm::dot(receiver.n, way), distance2 = glm::dot(way, way);
-    if (!(facing > 0)) return {};
-    const float least = sqr(shape_.radius(link.source)), far = glm::distance(source, shape_.center(link.receiver));
-    const float f = facing / std::sqrt(distance2) * std::max(sqr(far), least) / std::max(distance2, least);
-    return {f * flow.flow, f * sum};
-  }
-
-  /// Takes off what is hidden. In the mean over rays to points that are picked by what they bring, or, for the sum of form
-  /// factors of a source that does not shine evenly, to any.
-  void occlude(Gathered& g, const Link& link, const Receiver& receiver, Tracer& tracer) const {
-    if (!(g.sum > 0)) return;
-    const float importance = brightness(link.source, link.receiver) * g.sum / (options_.error * mean_);
-    if (!link.plain() && kRaysOfError * importance < 1) return occlude_at_random(g, link, receiver, importance, tracer);
-    const std::uint32_t rays = rays_of(importance);
-    const float visible = visible_share(link, receiver, rays, true, tracer);
-    const bool even = is_cluster(link.source) || spread_[link.source] <= kEven * max_component(radiosity_[link.source]);
-    const bool closed = shape_.faces[shape_.elements[receiver.element].face].enclosed;
-    g.E *= visible;
-    g.sum *= even || !closed ? visible : visible_share(link, receiver, rays, false, tracer);
-  }
-
-  /// The same for a link that would deserve a part of a ray: some get a whole one, which then counts for others, too; they all
-  /// start from what the link is known to see.
-  void occlude_at_random(Gathered& g, const Link& link, const Receiver& receiver, float importance, Tracer& tracer) const {
-    const float chance = kRaysOfError * importance;
-    float visible = link.visibility;
-    if (to_unit_float(hash32(receiver.element, hash32(link.receiver, link.source))) < chance)
-      visible += (visible_share(link, receiver, 1, true, tracer) - visible) / chance;
-    g.E *= visible;
-    g.sum *= visible;
-  }
-
-  float visible_share(const Link& link, const Receiver& receiver, std::uint32_t rays, bool bright, Tracer& tracer) const {
-    constexpr std::uint32_t kTries = 4;  // to find a point that faces the receiver
-    const std::uint32_t key = hash32(receiver.element, hash32(link.source, bright ? 2 : 3));
-    const PairSequence sequence(key);
-    std::uint32_t visible = 0;
-    for (std::uint32_t r = 0; r < rays; ++r) {
-      Hierarchy::Place place{};
-      for (std::uint32_t i = kTries * r; i < kTries * (r + 1); ++i) {
-        const PairOfPoints random = sequence[i];
-        place =
-            bright ? bright_place(link.source, random.pick.x, random.u) : shape_.place(link.source, random.pick.x, random.u);
-        const Vec3 way = place.p - receiver.p;
-        if (glm::dot(way, receiver.n) > 0 && glm::dot(way, shape_.elements[place.element].flat.normal) < 0) break;
-      }
-      if (!tracer.occluded(spawn_ray_to(receiver.at, shape_.locate(place)), hash32(key, r), node_)) ++visible;
-    }
-    return static_cast<float>(visible) / static_cast<float>(rays);
-  }
-
-  /// A point of a leaf below an element, picked by its radiosity; of a cluster any.
-  Hierarchy::Place bright_place(NodeRef n, float pick, const Vec2& u) const {
-    while (!is_cluster(n) && !shape_.elements[n].leaf()) {
-      const std::uint32_t first = shape_.elements[n].children;
-      float up_to[4], sum = 0;
-      for (std::uint32_t c = 0; c < 4; ++c) up_to[c] = sum += mean_component(radiosity_[first + c]);
-      if (!(sum > 0)) break;
-      std::uint32_t c = 0;
-      while (c < 3 && pick * sum >= up_to[c]) ++c;
-      const float below = c > 0 ? up_to[c - 1] : 0;
-      pick = std::min((pick * sum - below) / (up_to[c] - below), kOneMinusEpsilon);
-      n = first + c;
-    }
-    return shape_.place(n, pick, u);
-  }
-
   QuadTree result() const {
     const Scene& scene = context_.scene();
     QuadTree tree(patches_);
-    std::vector<Color> scattered = irradiance_, radiosity;
+    std::vector<Color> scattered = light_.irradiance, radiosity;
     for (std::size_t i = 0; i < scattered.size(); ++i) scattered[i] -= shape_.elements[i].source;
-    pull(scattered, radiosity);
+    light_.pull(scattered, radiosity);
     for (std::uint32_t i = 0; i < shape_.faces.size(); ++i) {
       const Face& face = shape_.faces[i];
       const bool wanted = options_.to(scene.part_tags(patches_->part(face.id / 2)));
@@ -624,12 +363,8 @@ class Solver {
   std::shared_ptr<const Patches> patches_;
 
   Links links_;
-  std::vector<Color> radiosity_, irradiance_;  // by element; irradiance: all of it, that of the input too
-  std::vector<float> correction_;              // by element, of what links bring
-  std::vector<float> spread_;                  // by element: how much its leaves' radiosity differs from its own
-  std::vector<float> cluster_brightness_;
-  std::vector<std::uint8_t> cluster_lit_;
-  float mean_ = 0;  // radiosity
+  Light light_;
+  std::vector<float> correction_;  // by element, of what links bring
 };
 
 }  // namespace

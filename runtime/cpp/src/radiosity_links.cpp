@@ -140,4 +140,13 @@ std::vector<Color> Links::transport(Workers& workers, const std::vector<Color>& 
   return arriving;
 }
 
+/// Sums of form factors are corrected by no more than this.
+constexpr float kLargestCorrection = 1.5f;
+
+float sum_correction(const Hierarchy& shape, std::uint32_t element, float sum) {
+  if (!(sum > 0)) return 1;
+  const bool closed = shape.faces[shape.elements[element].face].enclosed;
+  return std::clamp(1 / sum, 1 / kLargestCorrection, closed ? kLargestCorrection : 1.0f);
+}
+
 }  // namespace ln::radiosity

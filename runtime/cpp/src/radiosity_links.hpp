@@ -1,6 +1,7 @@
 #pragma once
 // What light goes over between the cells and clusters of radiosity.
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -75,6 +76,18 @@ class Links {
   std::vector<Link> links_;
   std::vector<std::size_t> first_of_element_, first_of_cluster_;
 };
+
+inline constexpr std::uint32_t kMostRays = 16;
+/// Rays of a link that carries as much as it may err.
+inline constexpr float kRaysOfError = 4;
+/// Number of rays for a link that carries so many times what it may err.
+inline std::uint32_t rays_of(float importance) {
+  return static_cast<std::uint32_t>(std::clamp(kRaysOfError * importance, 1.0f, static_cast<float>(kMostRays)));
+}
+
+/// What irradiance on an element is multiplied by whose form factors add up to `sum`: they should to 1 where its face sees
+/// nothing but surfaces, and nowhere to more.
+float sum_correction(const Hierarchy& shape, std::uint32_t element, float sum);
 
 /// Random numbers for a point of each of two things.
 struct PairOfPoints {

@@ -1,0 +1,51 @@
+#pragma once
+// Irradiance at points of surfaces, over the links of radiosity.
+
+#include "radiosity_light.hpp"
+#include "radiosity_links.hpp"
+
+namespace ln::radiosity {
+
+class Gatherer {
+ public:
+  /// `allowed`: what a link may err by [W/m^2]. Spreads and clusters of the light must be known.
+  Gatherer(PrepareContext& context, NodeId node, const Hierarchy& shape, const Links& links, const Light& light, float allowed)
+      : context_(context), node_(node), shape_(shape), links_(links), light_(light), allowed_(allowed) {}
+
+  /// Irradiance in the middle of each leaf that the radiosity makes, with form factors of and rays from that point; on
+  /// large leaves the mean of several points.
+  std::vector<Color> at_leaves() const;
+
+ private:
+  struct Gathered {
+    Color E{0};
+    float sum = 0;  // of form factors
+  };
+
+  struct Receiver {
+    Receiver(const Hierarchy& shape, const Hierarchy::Place& place)
+        : element(place.element), p(place.p), n(shape.elements[place.element].flat.normal), at(shape.locate(place)) {}
+    std::uint32_t element;
+    Vec3 p, n;
+    SurfacePosition at;
+  };
+
+  static std::uint32_t points_in(const Element& element);
+  Gathered gather(const Receiver& receiver, const std::vector<Flow>& flows, const std::vector<float>& sums,
+                  Tracer& tracer) const;
+  void add_unoccluded(std::uint32_t element, const Receiver& receiver, Gathered& g) const;
+  Gathered unoccluded(const Link& link, const Flow& flow, float sum, const Receiver& receiver) const;
+  void occlude(Gathered& g, const Link& link, const Receiver& receiver, Tracer& tracer) const;
+  void occlude_at_random(Gathered& g, const Link& link, const Receiver& receiver, float importance, Tracer& tracer) const;
+  float visible_share(const Link& link, const Receiver& receiver, std::uint32_t rays, bool bright, Tracer& tracer) const;
+  Hierarchy::Place bright_place(NodeRef n, float pick, const Vec2& u) const;
+
+  PrepareContext& context_;
+  NodeId node_;
+  const Hierarchy& shape_;
+  const Links& links_;
+  const Light& light_;
+  float allowed_;
+};
+
+}  // namespace ln::radiosity

@@ -75,7 +75,7 @@ TEST_CASE("what is wrong is said with its line") {
   CHECK(fault("1,2,3,0,0,one\n") == "1: nz must be a finite number, not \"one\"");
   CHECK(fault("1,2,nan,0,0,1\n") == "1: z must be a finite number, not \"nan\"");
   CHECK(fault("1,2,3,0,0,-inf\n") == "1: nz must be a finite number, not \"-inf\"");
-  CHECK(fault("1e39,2,3,0,0,1\n") == "1: x must be a finite number, not \"1e39\"");
+  CHECK(fault("1e400,2,3,0,0,1\n") == "1: x must be a finite number, not \"1e400\"");
   CHECK(fault("\n1,2,3,0,0,0\n") == "2: the normal nx,ny,nz is zero; it says which way the sensor looks");
   CHECK(fault("1;2;3;0;0;1\n") == "1: columns are separated by commas; a sensor needs x,y,z,nx,ny,nz");
   CHECK(fault("x,y,z,nx,ny,nz,name\n1,2,3,0,0,1,\"desk\n") == "2: a quotation mark is not closed on its line");

@@ -96,10 +96,10 @@ def run_program(tmp_path: Path) -> Callable[..., Run]:
 
 @pytest.fixture
 def kept_wire(compiled_network: Callable[..., Path], run_program: Callable[..., Run]) -> Callable[..., None]:
-    """kept_wire(name, text, change): a network with a cache makes the same picture from it, without a shadow ray; but
-    not after `--set change`."""
+    """kept_wire(name, text, change, rays): a network with a cache makes the same picture from it, without a ray of this
+    kind; but not after `--set change`."""
 
-    def check(name: str, text: str, change: str) -> None:
+    def check(name: str, text: str, change: str, rays: str = "shadow") -> None:
         program, scene = compiled_network(name, text=text), SCENES / "cornell_box.gltf"
         size = ("--size", "6x4", "--samples", "2")
         first = run_program(program, scene, *size)
@@ -107,7 +107,7 @@ def kept_wire(compiled_network: Callable[..., Path], run_program: Callable[..., 
         again = run_program(program, scene, *size)
         assert first.status == again.status == 0, first.stderr + again.stderr
         assert again.picture.read_bytes() == picture
-        assert first.stats["rays"]["shadow"] > 1000 and again.stats["rays"]["shadow"] == 0
+        assert first.stats["rays"][rays] > 1000 and again.stats["rays"][rays] == 0
         assert "cache" not in first.stderr + again.stderr
         other = run_program(program, scene, *size, "--set", change)
         assert "made by another network, or with other parameters" in other.stderr

@@ -110,7 +110,8 @@ class Operator:
     depth_parameter: str | None  # the count parameter that cuts a recursion after so many steps (0: never)
     equal: tuple[str, ...]  # ports that must carry equal light paths, which count once
     prepares: bool  # works before the picture: its C++ has a `prepare` function
-    cached: bool  # may know its wire from an earlier run: then nothing that it alone reads is prepared
+    cached: bool  # may know its wire from an earlier run: then nothing that it alone reads whole is prepared
+    for_view: bool  # what it prepares depends on what results look at: camera, size of the picture, places of probes
     overloads: str | None  # another operator, whose name stands for this one where the inputs are of this one's kind
     span: Span = field(compare=False, repr=False)
 

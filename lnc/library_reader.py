@@ -155,6 +155,7 @@ class _OperatorReader:
             equal=self._equal(body, ports),
             prepares=any(p.complete for p in ports) or any(isinstance(i, ast.PrepareDeclaration) for i in body),
             cached=any(isinstance(i, ast.PrepareDeclaration) and i.cached for i in body),
+            for_view=any(isinstance(i, ast.PrepareDeclaration) and i.for_view for i in body),
             overloads=overloads.name if overloads else None,
             span=declaration.name_span,
         )

@@ -49,8 +49,8 @@ change = Difference(sum, gather)
 
 photons = ParticleTracer(light, count = 4k, via = (D|S)@!small S?)
 stored  = CachePhotons(photons, file = "photons.lncache")
-sorted  = PhotonSurfSort(stored)
-map     = KDPhotonTree(photons)
+sorted  = CacheSortedPhotons(PhotonSurfSort(stored), file = "sorted.lncache")
+map     = CachePhotonMap(KDPhotonTree(photons), file = "map.lncache")
 second  = SecondaryTracer(direct, count = 4k, via = S?)
 
 sampled = PointsToQuadTree(direct, depth = 2, samples = 4)

@@ -92,7 +92,8 @@ class CacheView:
 
     network: str  # stands for the part of the network that leads to it
     code: str  # and for the sources that do the work
-    nodes: tuple[str, ...]  # the names of its nodes, whose parameters count
+    parameters: tuple[str, ...]  # NODE.PARAMETER: those that count, as they are when the program runs
+    for_view: bool  # it depends on what results look at
 
 
 @dataclass(frozen=True)
@@ -346,19 +347,26 @@ class _Builder:
     # --- Caches -------------------------------------------------------------------------------------------------------
 
     def upstream(self, names: Iterable[str], through_caches: bool) -> set[str]:
-        """The nodes with these names and all that they read; what caches read only where `through_caches`."""
+        """The nodes with these names and all that they read; what caches read whole only where `through_caches`."""
         found: set[str] = set()
         stack = list(names)
         while stack:
             name = stack.pop()
             if name not in found:
                 found.add(name)
-                if through_caches or not self.by_name[name].op.cached:
-                    stack += self.sources(self.by_name[name])
+                n = self.by_name[name]
+                stack += self.sources(n)
+                if through_caches or not n.op.cached:
+                    stack += self.whole_sources(n)
         return found
 
     def sources(self, n: ScheduledNode) -> list[str]:
-        return [term.node for i in n.inputs for term in i.terms]
+        """What a node asks while others ask it."""
+        return [term.node for i in n.inputs for term in i.terms if not i.port.complete]
+
+    def whole_sources(self, n: ScheduledNode) -> list[str]:
+        """What a node reads when it prepares, and never again."""
+        return [term.node for i in n.inputs for term in i.terms if i.port.complete]
 
     def guard(self, n: ScheduledNode) -> str:
         """When a node is to be prepared: if it carries light, and some cache that alone needs it has nothing stored."""
@@ -376,23 +384,27 @@ class _Builder:
             return ""
         served: list[str] = []
         for cache in self.schedule.nodes:
-            if cache.op.cached and n.name in self.upstream(self.sources(cache), through_caches=False):
+            if cache.op.cached and n.name in self.upstream(self.whole_sources(cache), through_caches=False):
                 outer = self.wanted(cache)
                 served.append(f"{self.members[cache.identifier]}.wanted()" + (f" && {outer}" if outer else ""))
         return f"({' || '.join(served)})" if len(served) > 1 else "".join(served)
 
     def cache(self, n: ScheduledNode) -> CacheView:
         """What a cached wire is made from, and by which sources."""
-        names = self.upstream(self.sources(n), through_caches=True)
-        nodes = [self.by_name[name] for name in sorted(names) if not self.by_name[name].op.cached]
+        nodes = [self.by_name[name] for name in sorted(self.upstream([n.name], through_caches=True))]
         lines = [f"{tag.name} {tag.globs}" for tag in self.schedule.tags]
         for node in nodes:
             inputs = [(i.port.name, [(t.node, t.weight) for t in i.terms]) for i in node.inputs]
-            parameters = [(p.name, getattr(p.value, "text", p.value)) for p in node.parameters]
+            parameters = [(p.name, getattr(p.value, "text", p.value)) for p in _making(node)]
             lines.append(f"{node.name} {node.op.name} {inputs} {parameters}")
         headers = sorted({Path(node.op.folder) / f"{node.op.file_stem}.hpp" for node in nodes})
         code = [lnc.__version__, runtime_sources(), *(header.read_text("utf-8") for header in headers)]
-        return CacheView(digest(lines), digest(code), tuple(node.name for node in nodes))
+        return CacheView(
+            network=digest(lines),
+            code=digest(code),
+            parameters=tuple(f"{node.name}.{p.name}" for node in nodes for p in _making(node)),
+            for_view=any(node.op.for_view for node in nodes),
+        )
 
     def skip(self, n: ScheduledNode) -> SkipView:
         """The condition of a node as tables; one too long for them becomes "always"."""
@@ -638,6 +650,11 @@ class _Builder:
                 )
             )
         return found
+
+
+def _making(n: ScheduledNode) -> list[ParameterValue]:
+    """The parameters that decide what a node makes: all but the file that it is kept in."""
+    return [p for p in n.parameters if not (n.op.cached and p.name == "file")]
 
 
 def _merged(terms: tuple[Term, ...]) -> dict[str, float]:

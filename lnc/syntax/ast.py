@@ -360,6 +360,7 @@ class EqualDeclaration(Record):
 
 class PrepareDeclaration(Record):
     cached: bool
+    for_view: bool
     comments: Comments
     span: Span
 

@@ -349,7 +349,8 @@ class Builder:
         return ast.EqualDeclaration(tuple(c.text for c in children), self._comments(span), span)
 
     def prepare(self, span: Span, children: Children) -> ast.PrepareDeclaration:
-        return ast.PrepareDeclaration(bool(children), self._comments(span), span)
+        words = {child.text for child in children}
+        return ast.PrepareDeclaration("cached" in words, "view" in words, self._comments(span), span)
 
     def overloads(self, span: Span, children: Children) -> ast.OverloadsDeclaration:
         return ast.OverloadsDeclaration(children[0].text, self._comments(span), span)

@@ -153,8 +153,8 @@ def _item(item: ast.Statement | ast.OperatorItem) -> tuple[str, str, str, tuple[
             return "recursion", kind if bound is None else f"{kind} {bound}", "", ()
         case ast.EqualDeclaration(ports):
             return "equal", ", ".join(ports), "", ()
-        case ast.PrepareDeclaration(cached):
-            return "prepare cached" if cached else "prepare", "", "", ()
+        case ast.PrepareDeclaration(cached, for_view):
+            return "prepare", " ".join(["cached"] * cached + ["for view"] * for_view), "", ()
         case ast.OverloadsDeclaration(name):
             return "overloads", name, "", ()
     raise AssertionError(item)

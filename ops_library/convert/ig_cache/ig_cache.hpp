@@ -1,7 +1,10 @@
 #pragma once
 
 #include <limits>
+#include <optional>
+#include <string>
 
+#include "ln/cache.hpp"
 #include "ln/hemisphere_request.hpp"
 #include "ln/operator.hpp"
 
@@ -13,13 +16,26 @@ struct IGCache {
   float error = 0.2f;
   float closest = 0.02f, farthest = 0.15f;
   std::int64_t bounces = 6;
+  std::string file;
+
+  /// Reads the records from the file, if it is of use.
+  void open(PrepareContext& context, const CacheKey& key) {
+    cache_key_ = key;
+    if (const auto found = read_cache<IrradianceRecordSets>(context, key, file)) {
+      sets_ = std::move(*found);
+      wanted_ = false;
+    }
+  }
+  /// Must records be made?
+  bool wanted() const { return wanted_; }
 
   void prepare(PrepareContext& context, const auto& samples) {
     key_ = hash32(hash32(static_cast<std::uint32_t>(context.seed()), static_cast<std::uint32_t>(context.seed() >> 32)), node);
-    seen_ = IrradianceRecords({error, closest, farthest});
-    beyond_ = IrradianceRecords({kCoarserError * error, kCoarser * closest, kCoarser * farthest});
+    sets_.seen = IrradianceRecords({error, closest, farthest});
+    sets_.beyond = IrradianceRecords({kCoarserError * error, kCoarser * closest, kCoarser * farthest});
     solve_beyond(context, samples);
     cover_seen(context, samples);
+    if (cache_key_) write_cache(sets_, *cache_key_, file);
   }
 
   template <class Visit>
@@ -34,13 +50,13 @@ struct IGCache {
       return records.visit(at.at.p, at.frame.n, limit, request.visit);
     };
     if (recursion.depth > 0) {
-      float cover = read(beyond_, IrradianceRecords::kOverlap);
-      if (cover <= IrradianceRecords::kEnough) cover += read(beyond_, IrradianceRecords::kFar);
-      if (cover == 0 && !beyond_.empty()) request.visit(ambient_, 1);
+      float cover = read(sets_.beyond, IrradianceRecords::kOverlap);
+      if (cover <= IrradianceRecords::kEnough) cover += read(sets_.beyond, IrradianceRecords::kFar);
+      if (cover == 0 && !sets_.beyond.empty()) request.visit(IrradianceRecord{.sample = {.irradiance = sets_.ambient}}, 1);
       return;
     }
     // What lies between the places that were looked at before, or in a gap, may be farther from records than is allowed.
-    if (read(seen_, IrradianceRecords::kOverlap) > IrradianceRecords::kEnough) return;
+    if (read(sets_.seen, IrradianceRecords::kOverlap) > IrradianceRecords::kEnough) return;
     const std::uint32_t key = hash32(request.random().bits(request.depth(), kRoulette));
     const Receiver where{at.hit, at.front, at.at.p, at.frame.n};
     request.visit(
@@ -48,7 +64,7 @@ struct IGCache {
   }
 
   /// The records, for taps.
-  IrradianceRecordSets irradiance_records() const { return {seen_, beyond_}; }
+  const IrradianceRecordSets& irradiance_records() const { return sets_; }
 
  private:
   // Records that the eye does not see: wider apart, made from fewer directions.
@@ -104,7 +120,7 @@ struct IGCache {
     for (std::vector<Receiver> origins :
          {seen, measured_receivers(context, node, kProbes), spread_receivers(context, kSpread)}) {
       for (int generation = 0; generation < kGenerations && !origins.empty(); ++generation) {
-        origins = cover(context, beyond_, asked_from(context, origins, samples), key_,
+        origins = cover(context, sets_.beyond, asked_from(context, origins, samples), key_,
                         [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
                           std::vector<Receiver> ignored;
                           return sample(tracer, where, key, kBeyondShare, samples, &ignored);
@@ -112,14 +128,14 @@ struct IGCache {
         places.insert(places.end(), origins.begin(), origins.end());
       }
     }
-    BounceSeries series(beyond_);
+    BounceSeries series(sets_.beyond);
     const auto with_bounces_so_far = [&](Tracer& tracer, const Receiver& where, std::uint32_t key) {
       return sample(tracer, where, key, kBeyondShare, samples);
     };
     for (std::int64_t round = 1; round < bounces && !series.converged(); ++round)
       series.add(context, places, key_, with_bounces_so_far);
     series.add_remaining();
-    ambient_.sample.irradiance = beyond_.mean_irradiance();
+    sets_.ambient = sets_.beyond.mean_irradiance();
   }
 
   /// Records where the eye sees surfaces, from a wide grid of pixels to all of them, and where probes and lightmaps measure.
@@ -132,17 +148,18 @@ struct IGCache {
       std::vector<Receiver> wanted = seen_receivers(
           context, node,
           [&](int x, int y) { return on_grid(x, y, stride) && (stride == kWidestStride || !on_grid(x, y, 2 * stride)); },
-          [&](const Receiver& r) { return !seen_.covers(r); });
-      cover(context, seen_, wanted, key_ + 1, exactly);
+          [&](const Receiver& r) { return !sets_.seen.covers(r); });
+      cover(context, sets_.seen, wanted, key_ + 1, exactly);
     }
-    cover(context, seen_, measured_receivers(context, node, std::numeric_limits<std::size_t>::max()), key_ + 1, exactly);
+    cover(context, sets_.seen, measured_receivers(context, node, std::numeric_limits<std::size_t>::max()), key_ + 1, exactly);
   }
 
  public:
   // State.
-  std::uint32_t key_ = 0;
-  IrradianceRecords seen_{}, beyond_{};
-  IrradianceRecord ambient_{};  // where there is no record beyond
+  std::uint32_t key_ = 0;  // of random numbers
+  IrradianceRecordSets sets_{};
+  std::optional<CacheKey> cache_key_{};
+  bool wanted_ = true;
 };
 
 }  // namespace ln::ops

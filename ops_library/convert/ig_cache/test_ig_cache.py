@@ -1,4 +1,4 @@
-"""IGCache: its octree and its series of bounces (in C++); the same bits with any number of threads; what it costs."""
+"""IGCache: octree and series of bounces (in C++), the same bits with any number of threads, its cost, its file."""
 
 import sys
 from pathlib import Path
@@ -120,3 +120,94 @@ def test_neither_light_nor_shadow_leaks(compiled_network, run_program, tmp_path)
     assert lit.sum() == 2 * (xs < 1.2).sum() + 26
     assert smooth["lux"][~lit].max() < 0.01 * brightest
     assert (np.abs(smooth["lux"] - truth)[lit] < 4 * traced["stderr"][lit] + 0.03 * brightest).all()
+
+
+KEPT = """
+network kept
+light   = Lights()
+photons = CachePhotons(ParticleTracer(light, count = 5k), file = "photons.cache")
+around  = Gather(NNDensity(photons))
+samples = IGSampler(around, samples = 16)
+records = IGCache(samples, file = "records.cache")
+smooth  = IGInterpolator(records)
+cells   = CacheQuadTree(PointsToQuadTree(smooth, depth = 2), file = "cells.cache")
+expect <= L (D|G|S)* E
+image  cells
+tap    records -> "records.csv"
+tap    smooth -> "smooth.exr"
+probe  smooth at "sensors.csv" -> "smooth.csv"
+"""
+TAPS = ("records.csv", "smooth.exr", "smooth.csv")
+
+
+@pytest.fixture
+def kept(compiled_network, run_program, tmp_path):
+    """kept(scene, options...): all files of a run but its caches; rays of nodes; notes about each cache."""
+    program = compiled_network("kept_records", text=KEPT)
+    (tmp_path / "sensors.csv").write_text(SENSORS)
+
+    def run(scene="cornell_box.gltf", *options):
+        done = run_program(program, SCENES / scene, "--size", "12x9", "--samples", "4", *options)
+        assert done.status == 0, done.stderr
+        files = [done.picture.read_bytes()] + [(tmp_path / name).read_bytes() for name in TAPS]
+        notes = {
+            line.split(":")[1].strip(): line for line in done.stderr.splitlines() if "this cache is not used" in line
+        }
+        return files, {node["name"]: node["rays"] for node in done.stats["nodes"]}, notes
+
+    return run
+
+
+def test_kept_records_make_the_same_picture_without_work(kept, tmp_path):
+    """Every file has the same bits, and no ray is cast for records."""
+    first, rays, notes = kept()
+    assert rays["records"] > 100 and not notes
+    again, rays_again, notes = kept("cornell_box.gltf", "--threads", "1")
+    assert again == first and not notes
+    assert rays_again["records"] == 0
+    # What lies between records is sampled on the spot: a small part of the work.
+    assert rays_again["around"] < 0.1 * rays["around"]
+
+
+@pytest.mark.parametrize(
+    ("options", "stale", "reason"),
+    [
+        (("cornell_box.gltf", "--seed", "3"), {"photons", "records", "cells"}, "it was made with seed 0"),
+        (("cornell_box.gltf", "--size", "13x9"), {"records", "cells"}, "it was made for another camera, size"),
+        (
+            ("cornell_box.gltf", "--set", "records.error=25%"),
+            {"records", "cells"},
+            "it was made by another network, or with",
+        ),
+        (
+            ("cornell_box.gltf", "--set", "photons_tracer.count=6k"),
+            {"photons", "records", "cells"},
+            "it was made by another network",
+        ),
+    ],
+)
+def test_stale_records(kept, options, stale, reason):
+    """Also what is made of records is stale then: cells know what their records looked at."""
+    kept()
+    fresh, _, notes = kept(*options)
+    assert set(notes) == {f"{name}.cache" for name in stale}
+    assert all(reason in note for note in notes.values()), notes
+    again, _, notes = kept(*options)
+    assert again == fresh and not notes
+
+
+def test_other_sensors_make_records_stale(kept, tmp_path):
+    kept()
+    (tmp_path / "sensors.csv").write_text(SENSORS.replace("1.5,0,-2.7", "1.4,0,-2.7"))
+    assert set(kept()[2]) == {"records.cache", "cells.cache"}
+
+
+def test_damaged_records(kept, tmp_path):
+    first, _, _ = kept()
+    cache = tmp_path / "records.cache"
+    whole = cache.read_bytes()
+    for content in (b"", whole[:200], whole[:-1], whole + b"x", whole[:300] + bytes([whole[300] ^ 1]) + whole[301:]):
+        cache.write_bytes(content)
+        files, _, notes = kept()
+        assert files == first and set(notes) == {"records.cache"}
+        assert cache.read_bytes() == whole

@@ -1,6 +1,7 @@
 #include "ln/cache.hpp"
 
 #include <array>
+#include <cmath>
 #include <cstring>
 
 #include "gltf_files.hpp"
@@ -14,20 +15,20 @@ namespace ln {
 namespace {
 
 constexpr char kMagic[8] = {'L', 'N', 'C', 'A', 'C', 'H', 'E', '\n'};
-constexpr std::uint32_t kVersion = 2;  // of everything below and of what encode() writes
+constexpr std::uint32_t kVersion = 3;  // of everything below and of what encode() writes
 
 /// The beginning of the file.
 struct Header {
   char magic[8];
   std::uint32_t version;
   char representation[20];
-  Fingerprint scene, network, code;
+  Fingerprint scene, network, code, view;
   std::uint64_t seed;
   std::uint64_t payload_size;
   Fingerprint payload;
   Fingerprint header;  // of everything before
 };
-static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 128, "no gaps");
+static_assert(std::is_trivially_copyable_v<Header> && sizeof(Header) == 144, "no gaps");
 
 Fingerprint fingerprint(const Header& header) {
   Fingerprint f;
@@ -43,6 +44,7 @@ Header make_header(std::string_view representation, const CacheKey& key, const s
   header.scene = key.scene;
   header.network = key.network;
   header.code = key.code;
+  header.view = key.view;
   header.seed = key.seed;
   header.payload_size = payload.size();
   header.payload.add(payload);
@@ -150,6 +152,24 @@ Fingerprint fingerprint(const SceneData& scene, const Image* environment) {
   return f;
 }
 
+Fingerprint fingerprint(const View& view) {
+  Fingerprint f;
+  for (const int x : {view.width, view.height}) f.add(x);
+  // Three pixels' rays and a height say where the camera stands and what it covers.
+  for (const Vec2& pixel : {Vec2(0), Vec2(1, 0), Vec2(0, 1)}) {
+    const Ray ray = view.rays.ray(pixel);
+    f.add(&ray.origin, sizeof ray.origin);
+    f.add(&ray.direction, sizeof ray.direction);
+  }
+  f.add(view.rays.height_at(1));
+  for (const MeasuredPlace& place : view.measured()) {
+    f.add(place.hit.triangle);
+    for (const float x : {place.hit.u, place.hit.v}) f.add(x);
+    f.add(place.front);
+  }
+  return f;
+}
+
 // --- Files -----------------------------------------------------------------------------------------------------------
 
 void CacheReader::check(std::uint64_t count, std::size_t size) const {
@@ -183,6 +203,8 @@ std::string load_cache(const std::string& path, std::string_view representation,
   if (header.scene != key.scene) throw Error("it was made for another scene");
   if (header.code != key.code) throw Error("it was made by another version of its operators or of the runtime library");
   if (header.network != key.network) throw Error("it was made by another network, or with other parameters");
+  if (header.view != key.view)
+    throw Error("it was made for another camera, size of the picture, or places where probes and lightmaps measure");
   if (header.seed != key.seed) throw Error("it was made with seed " + std::to_string(header.seed));
   std::string payload(bytes.substr(sizeof header));
   Fingerprint found;
@@ -216,6 +238,15 @@ void require(bool sound) {
   if (!sound) throw Error("it is damaged");
 }
 
+/// All that is left: photons on triangles of the scene.
+std::vector<Photon> decode_hits(CacheReader& in, PrepareContext& context) {
+  auto hits = in.get_all<Photon>();
+  require(in.at_end());
+  const std::size_t triangles = context.scene().data().triangles.size();
+  for (const Photon& photon : hits) require(photon.triangle < triangles);
+  return hits;
+}
+
 }  // namespace
 
 const char* cache_name(const Photons*) { return "Photons"; }
@@ -227,10 +258,34 @@ void encode(CacheBytes& out, const Photons& photons) {
 
 void decode(CacheReader& in, PrepareContext& context, Photons& photons) {
   photons.ledger = in.get<PhotonLedger>();
-  photons.hits = in.get_all<Photon>();
+  photons.hits = decode_hits(in, context);
+}
+
+const char* cache_name(const PhotonMap*) { return "PhotonMap"; }
+
+void encode(CacheBytes& out, const PhotonMap& map) {
+  out.put(std::uint64_t{map.size()});
+  out.put(std::span<const PhotonMap::Block>(map.blocks_));
+  out.put(std::span<const PhotonMap::Node>(map.nodes_));
+}
+
+void decode(CacheReader& in, PrepareContext&, PhotonMap& map) {
+  map.size_ = in.get<std::uint64_t>();
+  map.blocks_ = in.get_all<PhotonMap::Block>();
+  map.nodes_ = in.get_all<PhotonMap::Node>();
   require(in.at_end());
-  const std::size_t triangles = context.scene().data().triangles.size();
-  for (const Photon& photon : photons.hits) require(photon.triangle < triangles);
+  require(map.blocks_.size() == map.size_ / PhotonMap::kBlock + (map.size_ % PhotonMap::kBlock > 0));
+  require(map.nodes_.size() == map.blocks_.size());
+  for (const PhotonMap::Node& node : map.nodes_) require(node.axis < 3);
+}
+
+const char* cache_name(const SortedPhotons*) { return "SortedPhotons"; }
+
+// The rest follows from the scene.
+void encode(CacheBytes& out, const SortedPhotons& photons) { out.put(std::span<const Photon>(photons.hits)); }
+
+void decode(CacheReader& in, PrepareContext& context, SortedPhotons& photons) {
+  photons = sort_by_surface(context.scene().data(), decode_hits(in, context));
 }
 
 const char* cache_name(const QuadTree*) { return "QuadTree"; }
@@ -290,6 +345,77 @@ void decode(CacheReader& in, PrepareContext& context, TriMesh& mesh) {
   }
   require(in.at_end());
   mesh.finish(context.workers());
+}
+
+const char* cache_name(const IrradianceRecordSets*) { return "IrradianceRecords"; }
+
+namespace {
+
+/// A record without its horizon, whose values follow behind all records.
+struct StoredRecord {
+  Vec3 p, n;
+  float exact, reach, first_reach, clear, above;
+  Color irradiance;
+  glm::mat3 rotation, translation;
+  float distance, nearest;
+  std::uint32_t horizon;  // how many
+};
+static_assert(sizeof(StoredRecord) == 35 * sizeof(float), "no gaps");
+
+void encode(CacheBytes& out, const IrradianceRecords& records) {
+  out.put(records.spacing());
+  const std::vector<float> first_reaches = records.first_reaches();
+  std::vector<StoredRecord> stored;
+  std::vector<float> horizons;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const IrradianceRecord& r = records.records()[i];
+    const IrradianceSample& s = r.sample;
+    stored.push_back({r.p, r.n, r.exact, r.reach, first_reaches[i], r.clear, r.above, s.irradiance, s.rotation, s.translation,
+                      s.distance, s.nearest, static_cast<std::uint32_t>(s.horizon.size())});
+    horizons.insert(horizons.end(), s.horizon.begin(), s.horizon.end());
+  }
+  out.put(std::span<const StoredRecord>(stored));
+  out.put(std::span<const float>(horizons));
+}
+
+IrradianceRecords decode_records(CacheReader& in) {
+  constexpr float kFarthest = 2;  // from the origin, along each axis [normalised units]
+  IrradianceRecords records(in.get<RecordSpacing>());
+  const auto stored = in.get_all<StoredRecord>();
+  const auto horizons = in.get_all<float>();
+  auto horizon = horizons.begin();
+  for (const StoredRecord& s : stored) {
+    for (int axis = 0; axis < 3; ++axis) require(std::abs(s.p[axis]) <= kFarthest && std::abs(s.n[axis]) <= kFarthest);
+    require(s.first_reach >= 0 && s.first_reach < kInfinity);
+    require(s.horizon <= static_cast<std::size_t>(horizons.end() - horizon) && (s.horizon > 0 || s.clear == kInfinity));
+    const auto end = horizon + s.horizon;
+    records.restore({s.p,
+                     s.n,
+                     s.exact,
+                     s.reach,
+                     s.clear,
+                     s.above,
+                     {s.irradiance, s.rotation, s.translation, s.distance, s.nearest, {horizon, end}}},
+                    s.first_reach);
+    horizon = end;
+  }
+  require(horizon == horizons.end());
+  return records;
+}
+
+}  // namespace
+
+void encode(CacheBytes& out, const IrradianceRecordSets& sets) {
+  encode(out, sets.seen);
+  encode(out, sets.beyond);
+  out.put(sets.ambient);
+}
+
+void decode(CacheReader& in, PrepareContext&, IrradianceRecordSets& sets) {
+  sets.seen = decode_records(in);
+  sets.beyond = decode_records(in);
+  sets.ambient = in.get<Color>();
+  require(in.at_end());
 }
 
 }  // namespace ln

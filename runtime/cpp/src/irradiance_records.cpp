@@ -78,7 +78,6 @@ void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sampl
   record.sample.distance = record.reach / spacing_.error;
   limit_gradients(record.sample);
 
-  const auto index = static_cast<std::uint32_t>(records_.size());
   for_near(record.p, record.n, kFar, [&](const IrradianceRecord& near) {
     if (glm::dot(near.n, record.n) <= 0.5f) return false;
     IrradianceRecord& other = records_[static_cast<std::size_t>(&near - records_.data())];
@@ -91,8 +90,19 @@ void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sampl
     }
     return false;
   });
+  restore(record, record.reach);
+}
+
+void IrradianceRecords::restore(const IrradianceRecord& record, float first_reach) {
+  insert({record.p, first_reach, record.n, static_cast<std::uint32_t>(records_.size())}, 0, Vec3(0), 1);
   records_.push_back(record);
-  insert(index, 0, Vec3(0), 1);
+}
+
+std::vector<float> IrradianceRecords::first_reaches() const {
+  std::vector<float> reaches(records_.size());
+  for (const Node& node : nodes_)
+    for (const Entry& entry : node.entries) reaches[entry.record] = entry.reach;
+  return reaches;
 }
 
 void IrradianceRecords::set_value(std::size_t index, const IrradianceSample& sample) {
@@ -135,25 +145,24 @@ bool IrradianceRecords::covers(const Receiver& where) const {
 }
 
 /// A record is in all cells that it may reach of the level whose cells are just as wide as that.
-void IrradianceRecords::insert(std::uint32_t record, std::int32_t node, const Vec3& centre, float half) {
+void IrradianceRecords::insert(const Entry& entry, std::int32_t node, const Vec3& centre, float half) {
   constexpr float kSmallest = 0x1p-20f;
-  const IrradianceRecord& added = records_[record];
-  const float reach = kFar * added.reach;
+  const float reach = kFar * entry.reach;
   if (half < 2 * reach || half < kSmallest) {
-    nodes_[node].entries.push_back({added.p, added.reach, added.n, record});
+    nodes_[node].entries.push_back(entry);
     return;
   }
   const float quarter = 0.5f * half;
   for (int octant = 0; octant < 8; ++octant) {
     const Vec3 middle =
         centre + Vec3(octant & 1 ? quarter : -quarter, octant & 2 ? quarter : -quarter, octant & 4 ? quarter : -quarter);
-    const Vec3 off = glm::max(glm::abs(added.p - middle) - quarter, Vec3(0));
+    const Vec3 off = glm::max(glm::abs(entry.p - middle) - quarter, Vec3(0));
     if (glm::dot(off, off) > sqr(reach)) continue;
     if (nodes_[node].children[octant] < 0) {
       nodes_[node].children[octant] = static_cast<std::int32_t>(nodes_.size());
       nodes_.emplace_back();
     }
-    insert(record, nodes_[node].children[octant], middle, quarter);
+    insert(entry, nodes_[node].children[octant], middle, quarter);
   }
 }
 

@@ -98,15 +98,19 @@ void PrepareStep::claim(const std::string& file, NodeId cache) {
               "' are to be kept in this one file: give one of them another by --set " + other + ".file=NAME");
 }
 
-CacheKey PrepareStep::cache_key(const char* network, const char* code, std::initializer_list<const char*> nodes) {
+CacheKey PrepareStep::cache_key(const CacheOrigin& origin) {
   if (!scene_) scene_ = fingerprint(context_.scene().data(), environment_);
-  CacheKey key{*scene_, {}, {}, context_.seed()};
-  key.network.add(std::string_view(network));
-  key.code.add(std::string_view(code));
+  CacheKey key{*scene_, {}, {}, {}, context_.seed()};
+  if (origin.for_view) {
+    if (!looked_at_) looked_at_ = fingerprint(context_.view());
+    key.view = *looked_at_;
+  }
+  key.network.add(std::string_view(origin.network));
+  key.code.add(std::string_view(origin.code));
   for (const ParameterSlot& slot : run_.program.parameters) {
-    const auto same = [&](const char* name) { return std::string_view(name) == slot.node; };
-    if (std::any_of(nodes.begin(), nodes.end(), same))
-      key.network.add(std::string(slot.node) + "." + slot.name + "=" + parameter_text(slot));
+    const std::string name = std::string(slot.node) + "." + slot.name;
+    if (std::find(origin.parameters.begin(), origin.parameters.end(), name) != origin.parameters.end())
+      key.network.add(name + "=" + parameter_text(slot));
   }
   return key;
 }

@@ -2,8 +2,8 @@
 // Wires that are kept in files between runs.
 //
 // A cache holds what one wire stores, and what it was made from: the scene, the part of the network that leads to it with its
-// parameters, the sources of its operators and of this library, and the seed. Where any of them differs, or the file is
-// damaged, it is not used, a note says why, and the wire is computed and written again.
+// parameters, the sources of its operators and of this library, the seed, and, where that matters, what results look at. Where
+// any of them differs, or the file is damaged, it is not used, a note says why, and the wire is computed and written again.
 
 #include <cstdint>
 #include <memory>
@@ -14,9 +14,12 @@
 #include <vector>
 
 #include "ln/error.hpp"
+#include "ln/irradiance_records.hpp"
+#include "ln/photon_map.hpp"
 #include "ln/photon_tracer.hpp"
 #include "ln/prepare.hpp"
 #include "ln/quad_tree.hpp"
+#include "ln/sorted_photons.hpp"
 #include "ln/tri_mesh.hpp"
 
 namespace ln {
@@ -54,10 +57,14 @@ class Fingerprint {
 /// Of everything that a scene and its environment map say about light.
 Fingerprint fingerprint(const SceneData& scene, const Image* environment);
 
+/// Of the camera, the size of the picture, and the places where probes and lightmaps measure.
+Fingerprint fingerprint(const View& view);
+
 /// What a cached wire is made from.
 struct CacheKey {
   Fingerprint scene, network;
   Fingerprint code;  // of the operators and of the runtime library that make it
+  Fingerprint view;  // none if it does not depend on that
   std::uint64_t seed = 0;
 };
 
@@ -115,12 +122,21 @@ class CacheReader {
 const char* cache_name(const Photons*);
 void encode(CacheBytes& out, const Photons& photons);
 void decode(CacheReader& in, PrepareContext& context, Photons& photons);
+const char* cache_name(const PhotonMap*);
+void encode(CacheBytes& out, const PhotonMap& map);
+void decode(CacheReader& in, PrepareContext& context, PhotonMap& map);
+const char* cache_name(const SortedPhotons*);
+void encode(CacheBytes& out, const SortedPhotons& photons);
+void decode(CacheReader& in, PrepareContext& context, SortedPhotons& photons);
 const char* cache_name(const QuadTree*);
 void encode(CacheBytes& out, const QuadTree& tree);
 void decode(CacheReader& in, PrepareContext& context, QuadTree& tree);
 const char* cache_name(const TriMesh*);
 void encode(CacheBytes& out, const TriMesh& mesh);
 void decode(CacheReader& in, PrepareContext& context, TriMesh& mesh);
+const char* cache_name(const IrradianceRecordSets*);
+void encode(CacheBytes& out, const IrradianceRecordSets& sets);
+void decode(CacheReader& in, PrepareContext& context, IrradianceRecordSets& sets);
 
 /// The payload of a cache that was made from `key`; throws Error with the reason if there is none. An empty reason: no such
 /// file.
@@ -130,6 +146,28 @@ void save_cache(const std::string& path, std::string_view representation, const 
 /// Says why a cache is not used; nothing if `reason` is empty.
 void refuse_cache(const std::string& path, std::string_view reason);
 
+/// The wire in a file, if that can be used.
+template <class T>
+std::unique_ptr<T> read_cache(PrepareContext& context, const CacheKey& key, const std::string& path) {
+  try {
+    auto found = std::make_unique<T>();
+    const std::string payload = load_cache(path, cache_name(found.get()), key);
+    CacheReader in(payload);
+    decode(in, context, *found);
+    return found;
+  } catch (const Error& error) {
+    refuse_cache(path, error.what());
+    return nullptr;
+  }
+}
+
+template <class T>
+void write_cache(const T& wire, const CacheKey& key, const std::string& path) {
+  CacheBytes out;
+  encode(out, wire);
+  save_cache(path, cache_name(&wire), key, out.bytes());
+}
+
 /// A wire, read from its file or computed and written to it.
 template <class T>
 class CachedWire {
@@ -137,16 +175,8 @@ class CachedWire {
   /// Reads the file if it can be used.
   void open(PrepareContext& context, const CacheKey& key, const std::string& path) {
     key_ = key;
-    try {
-      const std::string payload = load_cache(path, cache_name(found_.get()), key);
-      CacheReader in(payload);
-      auto found = std::make_unique<T>();
-      decode(in, context, *found);
-      found_ = std::move(found);
-      wire_ = found_.get();
-    } catch (const Error& error) {
-      refuse_cache(path, error.what());
-    }
+    found_ = read_cache<T>(context, key, path);
+    wire_ = found_.get();
   }
 
   /// Must the wire be computed?
@@ -155,10 +185,7 @@ class CachedWire {
   /// Keeps what has been computed, which must outlive this; in the file, too, if that was to be opened.
   void keep(const T& computed, const std::string& path) {
     wire_ = &computed;
-    if (!key_) return;
-    CacheBytes out;
-    encode(out, computed);
-    save_cache(path, cache_name(&computed), *key_, out.bytes());
+    if (key_) write_cache(computed, *key_, path);
   }
 
   /// The wire; empty before either, as in a scene where it carries no light.

@@ -49,6 +49,7 @@ class IrradianceRecords {
   std::size_t size() const { return records_.size(); }
   bool empty() const { return records_.empty(); }
   const std::vector<IrradianceRecord>& records() const { return records_; }
+  const RecordSpacing& spacing() const { return spacing_; }
 
   /// Adds a record. Neighbours limit each other: nothing is farther from one than from the other plus the way between them
   /// (Krivanek et al. 2006, "neighbor clamping").
@@ -56,6 +57,12 @@ class IrradianceRecords {
 
   /// Takes a new value for a record; its reach stays.
   void set_value(std::size_t index, const IrradianceSample& sample);
+
+  /// How far each record reached when it was added, by which it lies in the octree.
+  std::vector<float> first_reaches() const;
+  /// Adds a record of another set as it is. All records of a set, in their order, make an equal set, to the last bit of what
+  /// `visit` finds.
+  void restore(const IrradianceRecord& record, float first_reach);
 
   Color mean_irradiance() const;
 
@@ -151,17 +158,18 @@ class IrradianceRecords {
     return kLeast * spacing_.closest * where.footprint;
   }
 
-  void insert(std::uint32_t record, std::int32_t node, const Vec3& centre, float half);
+  void insert(const Entry& entry, std::int32_t node, const Vec3& centre, float half);
 
   RecordSpacing spacing_;
   std::vector<IrradianceRecord> records_;
   std::vector<Node> nodes_;
 };
 
-/// The records of a wire: where the eye sees surfaces, and coarser ones where it does not but the records get their light from.
+/// The records of a wire.
 struct IrradianceRecordSets {
-  const IrradianceRecords& seen;
-  const IrradianceRecords& beyond;
+  IrradianceRecords seen{};    // where results look at surfaces
+  IrradianceRecords beyond{};  // coarser ones where they do not, but the records get their light from
+  Color ambient{0};            // [W/m^2] for surfaces beyond that no record reaches
 };
 
 void write_tap(const TapFile& tap, const IrradianceRecordSets& sets);

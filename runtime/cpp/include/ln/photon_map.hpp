@@ -31,6 +31,9 @@ struct Neighbourhood {
 /// Of the receiver of a request.
 inline Neighbourhood neighbourhood(const Interaction& at) { return {at.at.p, at.front ? at.at.ng : -at.at.ng, at.front}; }
 
+class CacheBytes;
+class CacheReader;
+
 class PhotonMap {
  public:
   PhotonMap() = default;
@@ -60,6 +63,9 @@ class PhotonMap {
   }
 
   static constexpr std::uint32_t kBlock = kLanes;
+
+  friend void encode(CacheBytes& out, const PhotonMap& map);
+  friend void decode(CacheReader& in, PrepareContext& context, PhotonMap& map);
 
  private:
   /// Photons that are scanned together.

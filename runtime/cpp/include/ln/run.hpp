@@ -38,6 +38,14 @@ namespace ln {
 /// Node 0 of every network: the picture itself. It casts camera rays.
 inline constexpr NodeId kEye = 0;
 
+/// What a program knows about the making of a wire that is kept.
+struct CacheOrigin {
+  const char* network;                       // stands for the part of the network that leads to it
+  const char* code;                          // for the sources that do the work
+  std::vector<std::string_view> parameters;  // NODE.PARAMETER: those that count, as they are now
+  bool for_view;                             // it depends on what results look at
+};
+
 /// Runs and times the preparation of one node after the other.
 class PrepareStep {
  public:
@@ -46,28 +54,27 @@ class PrepareStep {
               bool caches = true)
       : context_(context), run_(run), seconds_(seconds), environment_(environment), caches_(caches) {}
 
-  /// Lets a cache look whether it has its wire from an earlier run. `network` stands for the part of the network that leads to
-  /// it, `code` for the sources that do the work; the parameters of its `nodes` count as they are now. Throws Error if another
-  /// cache has the same file.
+  /// Lets a cache look whether it has its wire from an earlier run; one without a file has not. Throws Error if another cache
+  /// has the same file.
   template <class Cache>
-  void open(Cache& cache, const char* network, const char* code, std::initializer_list<const char*> nodes) {
-    if (!caches_) return;
+  void open(Cache& cache, const CacheOrigin& origin) {
+    if (!caches_ || cache.file.empty()) return;
     claim(cache.file, cache.node);
-    cache.open(context_, cache_key(network, code, nodes));
+    cache.open(context_, cache_key(origin));
   }
 
   void operator()(NodeId node, FunctionRef<void(PrepareContext&)> work);
 
  private:
   void claim(const std::string& file, NodeId cache);
-  CacheKey cache_key(const char* network, const char* code, std::initializer_list<const char*> nodes);
+  CacheKey cache_key(const CacheOrigin& origin);
 
   PrepareContext& context_;
   RunContext& run_;
   std::vector<double>& seconds_;
   const Image* environment_;
   bool caches_;
-  std::optional<Fingerprint> scene_;
+  std::optional<Fingerprint> scene_, looked_at_;
   std::map<std::filesystem::path, NodeId> files_;  // of caches
 };
 

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lnc.diagnostics import Diagnostic, InternalError, Related, Reporter
-from lnc.library import Library
+from lnc.library import Library, with_unknown_sources
 from lnc.library_reader import load_library
 from lnc.network import PathReport, Schedule, TypedNetwork
 from lnc.passes.check_cycles import check_cycles
 from lnc.passes.check_paths import check_paths
 from lnc.passes.contents import contents
-from lnc.passes.expand_macros import expand_macros
+from lnc.passes.expand_macros import Expanded, expand_macros
 from lnc.passes.insert_converters import insert_converters
 from lnc.passes.narrow_converters import narrow_converters
 from lnc.passes.resolve import resolve
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from lnc.passes.conditions import Formula
 
 SIZE_LIMIT = 256 * 1024
+LIGHT_PATH_CODES = "LN03"  # from here on a macro's mistakes depend on what it is given
 STAGES = ("parse", "expand_macros", "insert_converters", "schedule")
 
 Dump = Callable[[str, str], None]
@@ -113,33 +114,51 @@ def compile_network(
     _dump_text(dump, "parse", file)
     expanded = expand_macros(file, library, _read_used, reporter)
     if macros and file.statements and all(isinstance(s, ast.Macro | ast.Use) for s in file.statements):
-        return Result(file, None, {}, None, reporter.sorted())
+        return Result(file, None, {}, None, _all_diagnostics(reporter, expanded, library))
     file = expanded.file
     _dump_text(dump, "expand_macros", file)
-    network = resolve(file, _default_name(source.name), library, reporter, expanded.broken | file.broken)
-    typed = typecheck(sound_part(network, file, reporter), reporter)
-
-    def sound() -> TypedNetwork:
-        return replace(typed, network=sound_part(typed.network, file, reporter))
-
-    typed = insert_converters(sound(), library, reporter)
-    _check_inserted(typed, reporter)
-    typed = narrow_converters(sound())
-    check_cycles(typed.network, reporter)
-    typed = sound()
+    typed = _typed(expanded, _default_name(source.name), library, reporter)
     well_typed = not reporter.failed
     found = contents(typed.network, reporter)
     plan = None if reporter.failed else schedule(typed.network, found)
-    check_paths(sound(), reporter, exact, complete=plan is not None)
+    check_paths(_sound(typed, file, reporter), reporter, exact, complete=plan is not None)
     if dump is not None and plan is not None:
         from lnc.syntax.explicit import explicit
 
         dump("insert_converters", explicit(file, typed.network))
         dump("schedule", print_schedule(plan))
-    diagnostics = _with_calls(reporter.sorted(), expanded.calls)
+    diagnostics = _all_diagnostics(reporter, expanded, library)
     if not well_typed:
         return Result(file, None, {}, None, diagnostics)
     return Result(file, typed, found, plan, diagnostics)
+
+
+def _typed(expanded: Expanded, name: str, library: Library, reporter: Reporter, body: bool = False) -> TypedNetwork:
+    """Names, types, converters and cycles of a file, or of a macro's body: the part that is right."""
+    file = expanded.file
+    network = resolve(file, name, library, reporter, expanded.broken | file.broken, body)
+    typed = typecheck(sound_part(network, file, reporter), reporter)
+    typed = insert_converters(_sound(typed, file, reporter), library, reporter)
+    _check_inserted(typed, reporter)
+    typed = narrow_converters(_sound(typed, file, reporter))
+    check_cycles(typed.network, reporter)
+    return _sound(typed, file, reporter)
+
+
+def _sound(typed: TypedNetwork, file: ast.File, reporter: Reporter) -> TypedNetwork:
+    return replace(typed, network=sound_part(typed.network, file, reporter))
+
+
+def _all_diagnostics(reporter: Reporter, expanded: Expanded, library: Library) -> list[Diagnostic]:
+    """Also those of macros that nothing calls, but for light paths, which depend on what a macro is given."""
+    found = Reporter(_with_calls(reporter.sorted(), expanded.calls))
+    library = with_unknown_sources(library) if expanded.bodies else library
+    for body in expanded.bodies:
+        own = Reporter()
+        _typed(body, "", library, own, body=True)
+        for diagnostic in _with_calls(own.sorted(), body.calls):
+            found.add(diagnostic)
+    return found.sorted()
 
 
 def describe_paths(typed: TypedNetwork) -> PathReport:
@@ -211,16 +230,25 @@ def _read_used(name: str, source: SourceFile) -> SourceFile:
 
 
 def _with_calls(diagnostics: list[Diagnostic], calls: dict[Span, Span]) -> list[Diagnostic]:
-    """A mistake inside a macro is also shown where the macro is called, and the macro that calls it, and so on."""
+    """A mistake inside a macro is also shown where the macro is called, and the macro that calls it, and so on.
+
+    Of a macro that is called several times, what is wrong whatever it is given is shown for its first call.
+    """
     shown: list[Diagnostic] = []
+    known: set[tuple[str, str]] = set()
     for diagnostic in diagnostics:
-        related = list(diagnostic.related)
+        trail: list[Related] = []
         place: Span | None = diagnostic.span
         while place is not None:
             place = next((call for macro, call in calls.items() if macro.holds(place)), None)
             if place is not None:
-                related.append(Related(place, "in this call of the macro"))
-        shown.append(replace(diagnostic, related=tuple(related)))
+                trail.append(Related(place, "in this call of the macro"))
+        mistake = (diagnostic.code, str(diagnostic.span))
+        if trail and mistake in known:
+            continue
+        if diagnostic.code < LIGHT_PATH_CODES:
+            known.add(mistake)
+        shown.append(replace(diagnostic, related=(*diagnostic.related, *trail)))
     return shown
 
 

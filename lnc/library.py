@@ -153,6 +153,40 @@ class Library:
         return {name: tuple(ops) for name, ops in found.items()}
 
 
+def unknown_source(representation: str | None) -> str:
+    """The operator that stands for whatever gives a wire of this representation; no name in a text."""
+    return f"any {representation}"
+
+
+def with_unknown_sources(library: Library) -> Library:
+    """The library with an operator for each representation that gives it from nothing: for wires of unknown origin."""
+    sources = {
+        unknown_source(name): Operator(
+            name=unknown_source(name),
+            family="",
+            folder="",
+            doc="",
+            ports=(),
+            output=name,
+            pulled=representation.pulled,
+            parameters=(),
+            paths=(),
+            bias=0,
+            converter=None,
+            recursion=None,
+            depth_parameter=None,
+            equal=(),
+            prepares=False,
+            cached=False,
+            for_view=False,
+            overloads=None,
+            span=representation.span,
+        )
+        for name, representation in library.representations.items()
+    }
+    return Library({**library.operators, **sources}, library.representations)
+
+
 def first_sentence(doc: str) -> str:
     """What a list shows of a documentation, on one line."""
     paragraph = " ".join(doc.strip().split("\n\n")[0].split())

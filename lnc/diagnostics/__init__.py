@@ -72,12 +72,12 @@ class Reporter:
         witness: Witness | None = None,
         severity: str = "error",
     ) -> None:
-        self._add(Diagnostic(code, severity, message, span, label, tuple(related), _tuple(help), witness))
+        self.add(Diagnostic(code, severity, message, span, label, tuple(related), _tuple(help), witness))
 
     def warning(self, code: str, span: Span, message: str, *, label: str = "", help: str | None = None) -> None:
         self.error(code, span, message, label=label, help=help, severity="warning")
 
-    def _add(self, diagnostic: Diagnostic) -> None:
+    def add(self, diagnostic: Diagnostic) -> None:
         same = any(  # also in another call of a macro
             (d.code, d.message, str(d.span)) == (diagnostic.code, diagnostic.message, str(diagnostic.span))
             for d in self.diagnostics

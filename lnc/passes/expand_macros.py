@@ -7,18 +7,26 @@
 
 On entry: any syntax tree. On exit: no macro, no `use`, no call of a macro. Spans stay those of the macro's text, with a
 source of its own for each call but the first; `calls` says which call that was, so that a mistake inside is shown
-at both places. Faults are LN0111.
+at both places. The file's own macros that nothing calls become files of their own, `bodies`, whose inputs come from
+operators of which only the representation is known:
+
+    op Indirect(in: Points) -> Points {         in          = any Points()
+        out = PathTracer(in + out)         =>   out: Points = PathTracer(in + out)
+    }
+
+Faults are LN0111.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 from lnc.diagnostics import Related, Reporter, did_you_mean, quote
-from lnc.library import POINTS, Library, snake_case
+from lnc.library import POINTS, Library, snake_case, unknown_source
 from lnc.naming import Names
+from lnc.passes.parameters import letters_or_tag
 from lnc.passes.resolve import report_unknown_representation
 from lnc.record import Record
 from lnc.source import SourceFile, Span
@@ -28,6 +36,7 @@ from lnc.syntax.parse import parse
 EQUATION_LIMIT = 10_000
 FILE_LIMIT = 100
 RESULT = "out"
+_T = TypeVar("_T", bound=Record)
 
 Read = Callable[[str, SourceFile], SourceFile]
 """Reads the file that a `use` names, relative to the file it stands in. Raises OSError with a readable text."""
@@ -40,6 +49,8 @@ class Expanded:
     file: ast.File
     calls: dict[Span, Span] = field(default_factory=dict)
     broken: frozenset[str] = frozenset()  # wires whose macro call was wrong, which has been reported
+    called: frozenset[str] = frozenset()  # macros
+    bodies: tuple[Expanded, ...] = ()  # of the file's own macros that are not called
 
 
 def expand_macros(file: ast.File, library: Library, read: Read, reporter: Reporter) -> Expanded:
@@ -48,7 +59,8 @@ def expand_macros(file: ast.File, library: Library, read: Read, reporter: Report
         return Expanded(file)
     macros = _Macros(library, read, reporter)
     macros.collect(file)
-    return _Expander(macros, file, library, reporter).run()
+    expanded = _Expander(macros, file, library, reporter, _OUTSIDE).run()
+    return replace(expanded, bodies=tuple(_bodies(file, macros, library, reporter, expanded.called)))
 
 
 class _Macros:
@@ -130,8 +142,63 @@ _OUTSIDE = _Instance({}, {}, (), None)
 """Where the statements of the file stand, in no macro."""
 
 
+def _bodies(
+    file: ast.File, macros: _Macros, library: Library, reporter: Reporter, called: frozenset[str]
+) -> Iterator[Expanded]:
+    """The bodies of macros in a file that are not `called`, those first that no other macro calls: what they call is
+    looked at inside of them."""
+    own = [s for s in file.statements if isinstance(s, ast.Macro) and macros.found.get(s.name) is s]
+    inner = {call.op for macro in own for call in _parts(macro.body, ast.Call) if call.op != macro.name}
+    for macro in sorted(own, key=lambda m: m.name in inner):
+        if macro.name in called:
+            continue
+        body = _body(macro, file, macros, library, reporter)
+        called |= body.called
+        yield body
+
+
+def _body(macro: ast.Macro, file: ast.File, macros: _Macros, library: Library, reporter: Reporter) -> Expanded:
+    """What a macro does with inputs of which only the representation is known, and with its parameters' defaults."""
+    equations = {
+        i.name: ast.Equation(
+            i.name,
+            None,
+            ast.Call(unknown_source(i.representation), (), (), i.span, i.span),
+            ast.Comments(),
+            i.span,
+            i.span,
+        )
+        for i in macro.inputs
+        if i.representation in library.representations
+    }
+    for equation in macro.body:
+        equations.setdefault(equation.name, equation)
+    wires: dict[str, ast.WireExpression] = {name: ast.WireName(name, e.name_span) for name, e in equations.items()}
+    values = {i.name: i.default for i in macro.inputs if i.default is not None}
+    place = _Instance(wires, values, (macro.name,), macro)
+    tags = [s for s in file.statements if isinstance(s, ast.TagStatement)]
+    statements = (*tags, *equations.values())
+    expander = _Expander(macros, file.changed(statements=statements), library, reporter, place)
+    expander.broken |= {i.name for i in macro.inputs}  # where it is none of `wires`
+    expanded = expander.run()
+    if not all(isinstance(s, ast.Macro | ast.Use) for s in file.statements):
+        return expanded
+    # Tags are those of the networks that will use this file: any name may be one.
+    tree = expanded.file
+    named: list[ast.NameValue | ast.PathName | ast.TagRef] = [
+        *_parts(tree, ast.NameValue),
+        *_parts(tree, ast.PathName),
+        *_parts(tree, ast.TagRef),
+    ]
+    unique = {n.name: ast.TagStatement(n.name, (), ast.Comments(), n.span, n.span) for n in named}
+    return replace(expanded, file=tree.changed(statements=(*unique.values(), *tree.statements)))
+
+
 class _Expander:
-    def __init__(self, macros: _Macros, file: ast.File, library: Library, reporter: Reporter) -> None:
+    """`place`: where the equations of the file stand."""
+
+    def __init__(self, macros: _Macros, file: ast.File, library: Library, reporter: Reporter, place: _Instance) -> None:
+        self.place = place
         self.macros = macros.found
         self.unread = macros.unread
         self.file = file
@@ -140,6 +207,7 @@ class _Expander:
         self.equations = {s.name: s for s in file.statements if isinstance(s, ast.Equation)}
         self.names = Names(self.equations)
         self.calls: dict[Span, Span] = {}
+        self.called: set[str] = set(place.trail)
         self.converted: dict[tuple[str, str], str] = {}  # a wire and what inputs of macros want -> its conversion
         self.broken = set(file.broken | macros.broken)
         self.pending: list[tuple[ast.Equation, _Instance]] = []
@@ -152,7 +220,10 @@ class _Expander:
                 case ast.Macro() | ast.Use():
                     continue
                 case ast.Equation():
-                    self.pending.append((statement, _OUTSIDE))
+                    macro = self.place.macro
+                    if macro is not None and statement.name == RESULT:
+                        statement = statement.changed(representation=self._checked_as(macro, statement, None))
+                    self.pending.append((statement, self.place))
                 case ast.ImageStatement() | ast.TapStatement() | ast.LightmapStatement() | ast.ProbeStatement():
                     home = statement.span.text.split(maxsplit=1)[0]
                     statements.append(statement.changed(wire=self._wire(statement.wire, home, _OUTSIDE)))
@@ -161,7 +232,8 @@ class _Expander:
             while self.pending:
                 equation, instance = self.pending.pop()
                 statements += self._equation(equation, instance)
-        return Expanded(self.file.changed(statements=tuple(statements)), self.calls, frozenset(self.broken))
+        file = self.file.changed(statements=tuple(statements))
+        return Expanded(file, self.calls, frozenset(self.broken), frozenset(self.called))
 
     def _equation(self, equation: ast.Equation, instance: _Instance) -> list[ast.Statement]:
         """The equation without macro calls in it; equations of the macros it calls become pending."""
@@ -200,7 +272,7 @@ class _Expander:
         if instance.macro is None:
             return wire
         if name in instance.wires:
-            return instance.wires[name]
+            return instance.wires[name].changed(span=wire.span)
         known = list(instance.wires)
         message = f"no wire is called {quote(name)} in the macro {quote(instance.macro.name)}"
         help = did_you_mean(name, known) or "a macro sees its own inputs and equations only"
@@ -221,13 +293,14 @@ class _Expander:
                 if isinstance(wire, ast.WireName):
                     argument = argument.changed(value=value.changed(name=wire.name))
             elif isinstance(value, ast.PathLiteral):
-                argument = argument.changed(value=value.changed(path=_with_tags(value.path, instance.values)))
+                argument = argument.changed(value=value.changed(path=_with_values(value.path, instance.values)))
             replaced.append(argument)
         return tuple(replaced)
 
     def _call(self, call: ast.Call, name: str, instance: _Instance, equation: ast.Equation | None) -> None:
         """Queue the equations of one call, whose result is to be called `name`."""
         macro = self.macros[call.op]
+        self.called.add(call.op)
         if call.op in instance.trail or len(instance.trail) > 32:
             loop = " -> ".join([*instance.trail, call.op][-8:])
             self.reporter.error("LN0111", call.op_span, f"the macro {quote(call.op)} uses itself: {loop}")
@@ -368,6 +441,18 @@ class _Expander:
                 values[argument.name] = argument.value
 
 
+def _parts(tree: Any, kind: type[_T]) -> Iterator[_T]:
+    """The parts of a syntax tree that are of this kind."""
+    if isinstance(tree, kind):
+        yield tree
+    if isinstance(tree, tuple):
+        for part in tree:
+            yield from _parts(part, kind)
+    elif isinstance(tree, Record):
+        for name in tree.__match_args__:
+            yield from _parts(getattr(tree, name), kind)
+
+
 def _copied(tree: Any, source: SourceFile) -> Any:
     """A part of a syntax tree with its spans in another source of the same text."""
     if isinstance(tree, Span):
@@ -379,8 +464,8 @@ def _copied(tree: Any, source: SourceFile) -> Any:
     return tree
 
 
-def _with_tags(path: ast.PathExpression, values: Mapping[str, ast.Value]) -> ast.PathExpression:
-    """The path with the tags that are parameters of a macro replaced by their values."""
+def _with_values(path: ast.PathExpression, values: Mapping[str, ast.Value]) -> ast.PathExpression:
+    """The path with the tags and paths that are parameters of a macro replaced by their values."""
 
     def chosen(tag: ast.TagRef) -> ast.TagRef:
         match values.get(tag.name):
@@ -392,14 +477,28 @@ def _with_tags(path: ast.PathExpression, values: Mapping[str, ast.Value]) -> ast
 
     match path:
         case ast.PathConcat(items) | ast.PathUnion(items):
-            return path.changed(items=tuple(_with_tags(item, values) for item in items))
+            return path.changed(items=tuple(_with_values(item, values) for item in items))
         case ast.PathRepeat(item):
-            return path.changed(item=_with_tags(item, values))
+            return path.changed(item=_with_values(item, values))
         case ast.PathTagged(item, tag):
-            return path.changed(item=_with_tags(item, values), tag=chosen(tag))
+            return path.changed(item=_with_values(item, values), tag=chosen(tag))
         case ast.PathEvents(tag=ast.TagRef() as tag):
             return path.changed(tag=chosen(tag))
+        case ast.PathName(name, tag, span, False) if (given := _given_path(values.get(name), span)) is not None:
+            return given if tag is None else ast.PathTagged(given, chosen(tag), span)
         case ast.PathName(name, tag, span, negated):
             named = chosen(ast.TagRef(name, negated, span))
             return path.changed(name=named.name, negated=named.negated, tag=chosen(tag) if tag else None)
     return path
+
+
+def _given_path(value: ast.Value | None, span: Span) -> ast.PathExpression | None:
+    """The path that a parameter of a macro stands for; None where it stands for a tag or no path at all."""
+    match value:
+        case ast.NameValue(name):
+            path = letters_or_tag(name, span)
+        case ast.PathLiteral(path):
+            pass
+        case _:
+            return None
+    return None if isinstance(path, ast.PathName) else path

@@ -74,7 +74,7 @@ def _convert(
         case "tags", ast.PathLiteral(ast.PathName(name, None, span, negated)):
             return _known_tag(ast.TagRef(name, negated, span), tags, reporter, broken)
         case "path", ast.NameValue(name):
-            return _path(parameter, _letters_or_tag(name, value.span), tags, reporter, broken)
+            return _path(parameter, letters_or_tag(name, value.span), tags, reporter, broken)
         case "path", ast.PathLiteral(path):
             return _path(parameter, path, tags, reporter, broken)
     wanted = f"one of {', '.join(parameter.choices)}" if parameter.type == "choice" else WANTED[parameter.type]
@@ -107,7 +107,8 @@ def _plain(value: float, type: str) -> str:
     return f"{value:g}" + {"length": "m", "angle": "rad", "time": "s"}.get(type, "")
 
 
-def _letters_or_tag(name: str, span: Span) -> ast.PathExpression:
+def letters_or_tag(name: str, span: Span) -> ast.PathExpression:
+    """The path that a plain word is: events, or a tag."""
     if set(name) <= set("LDGSE"):
         events: list[ast.PathExpression] = [ast.PathEvents(letter, None, span) for letter in name]
         return ast.PathConcat(tuple(events), span) if len(events) > 1 else events[0]

@@ -29,10 +29,18 @@ TAG_KINDS = ("material", "mesh", "node")
 
 
 def resolve(
-    file: ast.File, name: str, library: Library, reporter: Reporter, broken: frozenset[str] = frozenset()
+    file: ast.File,
+    name: str,
+    library: Library,
+    reporter: Reporter,
+    broken: frozenset[str] = frozenset(),
+    body: bool = False,
 ) -> Network:
-    """The network of a file; `name` is its name if the text gives none. Wires in `broken` have been reported."""
-    return _Resolver(file, library, reporter, broken).run(name)
+    """The network of a file; `name` is its name if the text gives none. Wires in `broken` have been reported.
+
+    `body`: the file is the body of a macro, and has no results.
+    """
+    return _Resolver(file, library, reporter, broken).run(name, body)
 
 
 def define_tags(statements: Iterable[ast.Statement], reporter: Reporter) -> dict[str, Tag]:
@@ -83,7 +91,7 @@ class _Resolver:
         self.ends: dict[str, str | None] = {}  # second names -> the wire they stand for
         self.circular: set[str] = set()
 
-    def run(self, name: str) -> Network:
+    def run(self, name: str, body: bool) -> Network:
         names = [s for s in self.file.statements if isinstance(s, ast.NetworkName)]
         for again in names[1:]:
             self._twice(again.span, "the network has a name already", names[0].span)
@@ -126,11 +134,10 @@ class _Resolver:
                     self.reporter.error("LN0110", statement.span, message, help="give its folder by --ops")
         written: list[Tap | Probe | Lightmap] = [*taps, *probes, *lightmaps]
         self._check_distinct([(result.file, result.span) for result in written] + self._caches())
-        if image is None and not written and not self.reporter.failed:
-            start = self.file.statements[0].span if self.file.statements else self.file.span
-            self.reporter.error("LN0109", start, "the network has no result", help="add: image WIRE")
+        if not body:
+            self._check_result(image, written)
+            self._report_unused()
         self._check_layers(image)
-        self._report_unused()
         return Network(
             name=names[0].name if names else name,
             file=self.file.span.source.name,
@@ -215,7 +222,7 @@ class _Resolver:
             op = self.library.operators[equation.wire.op]
             what, related = f"'{op.name}' gives {found}", [_declared_here(op, op.span)]
         message = f"{quote(equation.name_span.text)} is to be {wanted}, but {what}"
-        help = f"to convert it, write: ... as {wanted}"
+        help = f"to convert it, write: ... as {wanted}" if cheapest_chains(self.library, found, wanted) else None
         self.reporter.error("LN0201", equation.wire.span, message, related=related, help=help)
 
     def _alias(self, equation: ast.Equation) -> None:
@@ -351,7 +358,7 @@ class _Resolver:
             elif ports and ports[-1].variadic:
                 port = ports[-1]
             else:
-                self._too_many_wires(op, wire.span)
+                self._too_many_wires(call, op, wire.span)
                 wrong = True
                 break
             if terms is None:
@@ -372,17 +379,17 @@ class _Resolver:
         misspelt = any(isinstance(a.value, ast.NameValue) for a in _unknown_arguments(call, op))
         if missing and not wrong and not misspelt:
             wanted = " and ".join(f"'{p.name}: {p.representation}'" for p in missing)
-            message = f"'{op.name}' needs its input {wanted}"
+            message = f"{_meant(call, op)} needs its input {wanted}"
             self.reporter.error("LN0105", call.span, message, related=[_declared_here(op, missing[0].span)])
         if missing or wrong:
             return None
         return tuple(_signed(given[p.name]) for p in op.ports)
 
-    def _too_many_wires(self, op: Operator, span: Span) -> None:
+    def _too_many_wires(self, call: ast.Call, op: Operator, span: Span) -> None:
         if not op.ports:
-            message = f"'{op.name}' takes no wires"
+            message = f"{_meant(call, op)} takes no wires"
         else:
-            message = f"'{op.name}' takes {len(op.ports)} wire{'s' if len(op.ports) > 1 else ''}"
+            message = f"{_meant(call, op)} takes {len(op.ports)} wire{'s' if len(op.ports) > 1 else ''}"
         help = "parameters are given by name: parameter = value" if op.parameters else None
         self.reporter.error("LN0107", span, message, help=help, related=[_declared_here(op, op.span)])
 
@@ -408,7 +415,7 @@ class _Resolver:
                 continue
             if op.parameter(argument.name) is None:
                 known = [p.name for p in op.parameters] + [p.name for p in op.ports]
-                message = f"'{op.name}' has no parameter {quote(argument.name)}"
+                message = f"{_meant(call, op)} has no parameter {quote(argument.name)}"
                 close = did_you_mean(argument.name, known)
                 listed = f"it has: {', '.join(known)}" if known else "it has none"
                 self.reporter.error("LN0103", argument.name_span, message, help=close or listed)
@@ -530,6 +537,11 @@ class _Resolver:
         self.made.add(name)
         self.nodes.append(Node(name, op, inputs, parameters, origin, span, home.statement, reason))
 
+    def _check_result(self, image: Image | None, written: list[Tap | Probe | Lightmap]) -> None:
+        if image is None and not written and not self.reporter.failed:
+            start = self.file.statements[0].span if self.file.statements else self.file.span
+            self.reporter.error("LN0109", start, "the network has no result", help="add: image WIRE")
+
     def _check_layers(self, image: Image | None) -> None:
         """No two layers of the picture may have one name."""
         layers: dict[str, Span] = {}
@@ -559,6 +571,11 @@ class _Resolver:
 def _unknown_arguments(call: ast.Call, op: Operator) -> list[ast.Argument]:
     """Arguments whose names the operator does not know: LN0103, and what seems to be missing may be one of them."""
     return [a for a in call.arguments if op.port(a.name) is None and op.parameter(a.name) is None]
+
+
+def _meant(call: ast.Call, op: Operator) -> str:
+    """The operator as the call has it, and what it is if that is overloaded."""
+    return f"'{call.op}'" + (f" (here the operator '{op.name}')" if op.name != call.op else "")
 
 
 def _declared_here(op: Operator, span: Span) -> Related:

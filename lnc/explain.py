@@ -130,6 +130,8 @@ def describe_operator(op: Operator) -> str:
         lines.append("works before the picture")
     if op.overloads:
         lines.append(f"{op.overloads}({', '.join(p.representation for p in op.ports)}) stands for it, too")
+    if op.scale_parameter:
+        lines.append(f"multiplies the light by '{op.scale_parameter}', which its paths do not show")
     if op.converter:
         lines.append(
             f"inserted where needed, cost {op.converter.cost:g}"

@@ -113,6 +113,7 @@ class Operator:
     cached: bool  # may know its wire from an earlier run: then nothing that it alone reads whole is prepared
     for_view: bool  # what it prepares depends on what results look at: camera, size of the picture, places of probes
     overloads: str | None  # another operator, whose name stands for this one where the inputs are of this one's kind
+    scale_parameter: str | None  # multiplies the light, which its paths do not show; may be negative where its range is
     span: Span = field(compare=False, repr=False)
 
     @property
@@ -125,6 +126,12 @@ class Operator:
 
     def parameter(self, name: str) -> Parameter | None:
         return next((p for p in self.parameters if p.name == name), None)
+
+    @property
+    def may_negate(self) -> bool:
+        """Can --set or the text turn the sign of the light?"""
+        factor = self.parameter(self.scale_parameter) if self.scale_parameter else None
+        return factor is not None and (factor.low is None or factor.low < 0)
 
 
 @dataclass(frozen=True)
@@ -180,6 +187,7 @@ def with_unknown_sources(library: Library) -> Library:
             cached=False,
             for_view=False,
             overloads=None,
+            scale_parameter=None,
             span=representation.span,
         )
         for name, representation in library.representations.items()

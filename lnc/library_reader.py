@@ -157,6 +157,7 @@ class _OperatorReader:
             cached=any(isinstance(i, ast.PrepareDeclaration) and i.cached for i in body),
             for_view=any(isinstance(i, ast.PrepareDeclaration) and i.for_view for i in body),
             overloads=overloads.name if overloads else None,
+            scale_parameter=self._scale_parameter(body, parameters),
             span=declaration.name_span,
         )
 
@@ -168,6 +169,14 @@ class _OperatorReader:
         if not any(p.name == recursion.bound and p.type == "count" for p in parameters):
             self._error(recursion.span, f"'{recursion.bound}' is no count parameter of this operator")
         return recursion.bound
+
+    def _scale_parameter(self, body: tuple[ast.OperatorItem, ...], parameters: tuple[Parameter, ...]) -> str | None:
+        item = next((i for i in body if isinstance(i, ast.ScalesDeclaration)), None)
+        if item is None:
+            return None
+        if not any(p.name == item.parameter and p.type in ("number", "ratio") for p in parameters):
+            self._error(item.span, f"'{item.parameter}' is no number or ratio of this operator")
+        return item.parameter
 
     def _equal(self, body: tuple[ast.OperatorItem, ...], ports: tuple[Port, ...]) -> tuple[str, ...]:
         names: list[str] = []

@@ -77,11 +77,12 @@ def test_wrong_declarations() -> None:
     texts = {
         "/ops/a/wrong_name/other.ln": "representation Points\noperator Wrong() -> Points {\npaths radiance = L\n}\n",
         "/ops/a/bad/bad.ln": "operator Bad(in: Nothing) -> Points {\nn: count = 1%\nm: thing\n}\n",
+        "/ops/a/scales/scales.ln": "operator Scales() -> Points {\nscales n\npaths radiance = L\nn: count = 1\n}\n",
         "/ops/a/paths/paths.ln": "operator Paths(in: Points) -> Points {\npaths light = in\npaths samples = D in\n}\n",
     }
     _, faults = read_library(texts)
     assert {d.code for d in faults} == {"LN0112"}
-    assert len(faults) == 7
+    assert len(faults) == 8
 
 
 def test_carets_stand_under_the_text() -> None:

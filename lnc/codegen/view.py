@@ -584,10 +584,10 @@ class _Builder:
         )
 
     def is_signed(self, terms: tuple[Term, ...]) -> bool:
-        """May a sum be negative? Where something on the way is subtracted, or scaled: --set may give any factor."""
+        """May a sum be negative? Where something on the way is subtracted, or scaled by what may be negative."""
         nodes = [self.by_name[name] for name in self.upstream((t.node for t in terms), through_caches=True)]
         sums = [terms, *(i.terms for n in nodes for i in n.inputs)]
-        return any(n.op.name == "Scale" for n in nodes) or any(t.weight < 0 for terms in sums for t in terms)
+        return any(n.op.may_negate for n in nodes) or any(t.weight < 0 for terms in sums for t in terms)
 
     def results(self) -> list[tuple[Term, ...]]:
         """The sums that become pictures and tables."""

@@ -89,7 +89,7 @@ def _receivers(contents: tuple[str, ...]) -> str:
 
 def _scales(node: ScheduledNode) -> bool:
     """Does the node change the energy of its input, which leaves its paths as they are?"""
-    factor = node.parameter("factor") if node.op.name == "Scale" else None
+    factor = node.parameter(node.op.scale_parameter) if node.op.scale_parameter else None
     return factor is not None and factor.value != 1
 
 

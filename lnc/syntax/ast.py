@@ -371,6 +371,14 @@ class OverloadsDeclaration(Record):
     span: Span
 
 
+class ScalesDeclaration(Record):
+    """`scales factor`: this parameter multiplies the light, but not how often its paths are counted."""
+
+    parameter: str
+    comments: Comments
+    span: Span
+
+
 OperatorItem = (
     ParameterDeclaration
     | PathsDeclaration
@@ -380,6 +388,7 @@ OperatorItem = (
     | EqualDeclaration
     | PrepareDeclaration
     | OverloadsDeclaration
+    | ScalesDeclaration
 )
 
 

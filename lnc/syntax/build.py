@@ -355,6 +355,9 @@ class Builder:
     def overloads(self, span: Span, children: Children) -> ast.OverloadsDeclaration:
         return ast.OverloadsDeclaration(children[0].text, self._comments(span), span)
 
+    def scales(self, span: Span, children: Children) -> ast.ScalesDeclaration:
+        return ast.ScalesDeclaration(children[0].text, self._comments(span), span)
+
 
 def _as_value(value: Any) -> ast.Value:
     """A path that is one plain word could be any name: leave that to the declared type."""

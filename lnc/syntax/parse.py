@@ -29,7 +29,7 @@ STATEMENT_WORDS = (
     "operator",
     "representation",
 )
-ITEM_WORDS = ("paths", "bias", "converter", "recursion", "equal", "prepare", "overloads")
+ITEM_WORDS = ("paths", "bias", "converter", "recursion", "equal", "prepare", "overloads", "scales")
 
 
 def parse(source: SourceFile, reporter: Reporter) -> File:

@@ -157,6 +157,8 @@ def _item(item: ast.Statement | ast.OperatorItem) -> tuple[str, str, str, tuple[
             return "prepare", " ".join(["cached"] * cached + ["for view"] * for_view), "", ()
         case ast.OverloadsDeclaration(name):
             return "overloads", name, "", ()
+        case ast.ScalesDeclaration(parameter):
+            return "scales", parameter, "", ()
     raise AssertionError(item)
 
 

@@ -5,20 +5,21 @@
 
 namespace ln::ops {
 
-/// The mean irradiance of surfaces; see average_ambient.ln.
+/// The mean irradiance of surfaces, in lit space; see average_ambient.ln.
 struct AverageAmbient {
   NodeId node;
   TagSelection from;
 
-  void prepare(PrepareContext& context, const QuadTree& in) { mean_ = ambient_irradiance(context, node, in, from); }
+  void prepare(PrepareContext& context, const QuadTree& in) { light_ = AmbientLight(context, node, in, from); }
 
   template <class Request>
   Color answer(Request& request, const QuadTree&) const {
-    return request.scatter_irradiance([&](const Interaction&) { return mean_; });
+    return request.scatter_irradiance(
+        [&](const Interaction& at) { return light_.irradiance(at.hit.triangle, at.hit.u, at.hit.v, at.front); });
   }
 
   // State.
-  Color mean_{0};
+  AmbientLight light_{};
 };
 
 }  // namespace ln::ops

@@ -39,6 +39,17 @@ def test_the_furnace_has_the_same_irradiance_everywhere(compiled_network, run_pr
     assert np.allclose(image, 1.5, rtol=0.005)
 
 
+def test_as_much_light_is_given_as_there_was(compiled_network, run_program):
+    """Direct light of the closed box, on all surfaces: the outside of the room and the insides of the blocks get none."""
+    text = "cells = PointsToQuadTree(Direct(Lights()), cell = 0.5m)\nambient = AverageAmbient(cells)\nimage ambient\n"
+    program = compiled_network("ambient_everywhere", text=text)
+    run = run_program(program, SCENES / "closed_box.gltf", "--verify-paths", "--samples", "256")
+    assert run.status == 0, run.stderr
+    found = {line.split()[0]: float(line.split()[2]) for line in run.stdout.splitlines()[1:]}
+    given, was = found["ambient"], found["cells"]
+    assert given == pytest.approx(was, rel=0.02), run.stdout
+
+
 def test_tags_say_what_is_averaged_and_who_gets_it(compiled_network, run_program):
     blocks, everywhere = picture(run_program, compiled_network("ambient", text=NETWORK), "cornell_box.gltf")
     dark = 5.0  # the lamp is brighter

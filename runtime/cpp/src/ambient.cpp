@@ -3,91 +3,133 @@
 #include <algorithm>
 
 #include "ln/diffuse_surface.hpp"
-#include "ln/distribution.hpp"
 
 namespace ln {
 
 namespace {
 
-/// A cell of a face on which no light arrives.
-struct DarkCell {
-  std::uint32_t face;
-  DomainCell domain;
-};
+/// Finds which share of a face's cells lies in lit space.
+class LitSpace {
+ public:
+  LitSpace(const Scene& scene, NodeId node, const QuadTree& in) : scene_(scene), node_(node), in_(in) {}
 
-/// Is the side of the part's surfaces one that light may be meant for? Not what is behind a single-sided surface, the inside of
-/// a thing, nor what does not scatter diffusely.
-bool counts_when_dark(const Scene& scene, std::uint32_t part, bool front) {
-  const SceneData& data = scene.data();
-  return (front || data.materials[data.parts[part].material].double_sided) && scatters_diffusely(scene, part, front);
-}
+  /// The face's tree: cells of `in` that are lit, and what is dark cut into cells that are all in lit space, or not at all, or
+  /// small.
+  std::vector<QuadTreeNode> nodes(Tracer& tracer, std::uint32_t face) const {
+    std::vector<QuadTreeNode> nodes(1);
+    grow(tracer, face, nodes, 0, in_.patches().domain(face / 2), in_.lit(face) ? &in_.nodes()[in_.root(face)] : nullptr);
+    return nodes;
+  }
 
-/// Does one of some walks from a point of the face, from surface to surface as diffuse light goes, come to where light arrives?
-bool reaches_light(Tracer& tracer, NodeId node, const QuadTree& in, std::uint32_t face, const Vec2& st, std::uint32_t key) {
-  constexpr std::uint32_t kWalks = 16, kSteps = 8;
-  const Scene& scene = tracer.scene();
-  for (std::uint32_t walk = 0; walk < kWalks; ++walk) {
+ private:
+  static constexpr float kSmall = 1.0f / 16;                           // extent of cells that are not cut [normalised units]
+  static constexpr std::uint32_t kPoints = 16, kPointsWhereSmall = 4;  // looked at in each cell
+  static constexpr std::uint32_t kWalks = 16, kSteps = 8;              // from each point
+
+  /// `lit`: the node of the cell in `in`; null where that is dark.
+  void grow(Tracer& tracer, std::uint32_t face, std::vector<QuadTreeNode>& nodes, std::size_t node, const DomainCell& cell,
+            const QuadTreeNode* lit) const {
+    const bool cut = lit && !lit->leaf();
+    if (!cut && lit && !is_black(lit->value)) {
+      nodes[node].value = Color(1);
+      return;
+    }
+    if (!cut) {
+      const SurfaceCell surface = surface_cell(in_.patches().surface(face / 2), cell);
+      const bool small = std::max(glm::length(surface.a), glm::length(surface.b)) < kSmall;
+      const std::uint32_t key = hash32(hash32(node_, face), static_cast<std::uint32_t>(node));
+      const float share = share_of(tracer, face, cell, small ? kPointsWhereSmall : kPoints, key);
+      nodes[node].value = Color(share);
+      if (small || share == 0 || share == 1) return;
+    }
+    const auto first = static_cast<std::uint32_t>(nodes.size());
+    nodes[node].children = first;
+    nodes.resize(nodes.size() + 4);
+    for (std::uint32_t i = 0; i < 4; ++i)
+      grow(tracer, face, nodes, first + i, cell.child(static_cast<int>(i)), cut ? &in_.nodes()[lit->children + i] : nullptr);
+  }
+
+  /// From which share of `count` points in a dark cell does light come to where it arrives?
+  float share_of(Tracer& tracer, std::uint32_t face, const DomainCell& cell, std::uint32_t count, std::uint32_t key) const {
+    std::uint32_t reached = 0;
+    for (std::uint32_t i = 0; i < count; ++i)
+      if (reaches_light(tracer, face, cell.point(sobol_point(key, 0, i)), hash32(key, i))) ++reached;
+    return static_cast<float>(reached) / static_cast<float>(count);
+  }
+
+  /// Does one of some walks from a point of the face, from surface to surface as diffuse light goes, come to where light
+  /// arrives? From the back of a single-sided surface, which may be the inside of a thing that stands on what is lit: do most
+  /// of them, in one step?
+  bool reaches_light(Tracer& tracer, std::uint32_t face, const Vec2& st, std::uint32_t key) const {
+    const bool inside = !open(in_.patches().part(face / 2), Patches::is_front(face));
+    const std::uint32_t steps = inside ? 1 : kSteps, wanted = inside ? kWalks / 2 + 1 : 1;
+    std::uint32_t reached = 0;
+    for (std::uint32_t walk = 0; walk < kWalks && reached < wanted; ++walk)
+      if (walk_reaches_light(tracer, face, st, steps, key, walk)) ++reached;
+    return reached == wanted;
+  }
+
+  bool walk_reaches_light(Tracer& tracer, std::uint32_t face, const Vec2& st, std::uint32_t steps, std::uint32_t key,
+                          std::uint32_t walk) const {
     SurfacePosition at;
-    scene.locate(in.patches().hit(face / 2, st), at);
+    scene_.locate(in_.patches().hit(face / 2, st), at);
     Vec3 normal = Patches::is_front(face) ? at.ng : -at.ng;
-    for (std::uint32_t step = 0; step < kSteps; ++step) {
+    for (std::uint32_t step = 0; step < steps; ++step) {
       const Vec3 direction = make_frame(normal).to_world(sample_cosine(sobol_point(key, step, walk)));
-      const Hit hit = tracer.intersect(spawn_ray(at, direction), hash32(key, walk), node, RayKind::gather);
-      if (!hit.found()) break;
-      scene.locate(hit, at);
+      const Hit hit = tracer.intersect(spawn_ray(at, direction), hash32(key, walk), node_, RayKind::gather);
+      if (!hit.found()) return false;
+      scene_.locate(hit, at);
       const bool front = glm::dot(direction, at.ng) < 0;
-      if (!is_black(in.irradiance(hit.triangle, hit.u, hit.v, front))) return true;
-      if (!counts_when_dark(scene, scene.data().triangle_part[hit.triangle], front)) break;
+      if (!is_black(in_.irradiance(hit.triangle, hit.u, hit.v, front))) return true;
+      const std::uint32_t part = scene_.data().triangle_part[hit.triangle];
+      if (!open(part, front) || !scatters_diffusely(scene_, part, front)) return false;
       normal = front ? at.ng : -at.ng;
     }
+    return false;
   }
-  return false;
-}
+
+  /// Is the side of the part's surfaces one that light is meant for, not what is behind a single-sided surface?
+  bool open(std::uint32_t part, bool front) const {
+    const SceneData& data = scene_.data();
+    return front || data.materials[data.parts[part].material].double_sided;
+  }
+
+  const Scene& scene_;
+  NodeId node_;
+  const QuadTree& in_;
+};
 
 }  // namespace
 
-Color ambient_irradiance(PrepareContext& context, NodeId node, const QuadTree& in, const TagSelection& from) {
-  if (in.empty()) return Color(0);
+AmbientLight::AmbientLight(PrepareContext& context, NodeId node, const QuadTree& in, const TagSelection& from) {
+  if (in.empty()) return;
   const Scene& scene = context.scene();
   const Patches& patches = in.patches();
+  const LitSpace lit_space(scene, node, in);
+  std::vector<std::vector<QuadTreeNode>> nodes(patches.face_count());
+  context.for_chunks(nodes.size(), 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
+    tracer.enter(node);
+    for (std::size_t face = begin; face < end; ++face)
+      if (area(patches.surface(static_cast<std::uint32_t>(face / 2))) > 0)
+        nodes[face] = lit_space.nodes(tracer, static_cast<std::uint32_t>(face));
+  });
+
+  space_ = QuadTree(in.shared_patches());
   DVec3 flux(0);
   double lit_area = 0;
-  std::vector<DarkCell> dark;
-  std::vector<double> dark_area;
   for (std::uint32_t face = 0; face < patches.face_count(); ++face) {
+    if (!nodes[face].empty()) space_.set(face, std::move(nodes[face]));
     const std::uint32_t part = patches.part(face / 2);
-    if (!from(scene.part_tags(part))) continue;
+    // What does not scatter diffusely holds no irradiance.
+    const bool counts = in.lit(face) || scatters_diffusely(scene, part, Patches::is_front(face));
+    if (!counts || !from(scene.part_tags(part))) continue;
     const SurfaceCell surface = patches.surface(face / 2);
-    const auto add_dark = [&](const DomainCell& cell) {
-      dark.push_back({face, cell});
-      dark_area.push_back(static_cast<double>(area(surface_cell(surface, cell))));
-    };
-    in.for_each_leaf(face, [&](const DomainCell& cell, const Color& E) {
-      if (is_black(E)) return add_dark(cell);
-      const auto a = static_cast<double>(area(surface_cell(surface, cell)));
-      flux += a * DVec3(E);
-      lit_area += a;
-    });
-    if (!in.lit(face) && area(surface) > 0 && counts_when_dark(scene, part, Patches::is_front(face)))
-      add_dark(patches.domain(face / 2));
+    const auto area_of = [&](const DomainCell& cell) { return static_cast<double>(area(surface_cell(surface, cell))); };
+    in.for_each_leaf(face, [&](const DomainCell& cell, const Color& E) { flux += area_of(cell) * DVec3(E); });
+    space_.for_each_leaf(
+        face, [&](const DomainCell& cell, const Color& share) { lit_area += area_of(cell) * static_cast<double>(share.x); });
   }
-  if (!(lit_area > 0)) return Color(0);
-
-  // Measure which share of what is dark light can reach, at points that are spread evenly over it.
-  constexpr std::uint32_t kPoints = 4096;
-  const Distribution by_area(dark_area);
-  std::vector<std::uint8_t> reached(by_area.empty() ? 0 : kPoints);
-  context.for_chunks(reached.size(), 64, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
-    tracer.enter(node);
-    for (auto i = static_cast<std::uint32_t>(begin); i < end; ++i) {
-      const DarkCell& cell = dark[by_area.sample((static_cast<float>(i) + 0.5f) / kPoints).index];
-      reached[i] =
-          reaches_light(tracer, node, in, cell.face, cell.domain.point(sobol_point(node, 1, i)), hash32(node, i)) ? 1 : 0;
-    }
-  });
-  const auto count = std::count(reached.begin(), reached.end(), 1);
-  const double shadow_area = by_area.total() * static_cast<double>(count) / kPoints;
-  return Color(flux / (lit_area + shadow_area));
+  if (lit_area > 0) mean_ = Color(flux / lit_area);
 }
 
 }  // namespace ln

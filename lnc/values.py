@@ -35,7 +35,8 @@ def number(text: str, type: str) -> int | float:
         known = ", ".join(u for u in units if u)
         if unit == "":
             raise ValueFault(f"{quote(text)} needs a unit ({known}): for example {EXAMPLES[type]}")
-        raise ValueFault(f"{quote(unit)} is not a unit of a {type} (known: {known})")
+        example = f"; write {value / 100:g}" if type == "number" and unit == "%" else ""
+        raise ValueFault(f"{quote(unit)} is not a unit of a {type} (known: {known}){example}")
     value *= units.get(unit, 1)
     if not math.isfinite(value):
         raise ValueFault(f"{quote(text)} is too large")

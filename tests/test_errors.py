@@ -127,3 +127,38 @@ def test_a_mistake_in_a_macro_that_is_called_twice_is_one_mistake(library: Libra
     text += "light = Lights()\nimage Dark(light) + Dark(light)\n"
     found = compile_network(SourceFile("twice.ln", text), library).diagnostics
     assert [(d.code, d.span.text, len(d.related)) for d in found] == [("LN0104", "0", 1)]
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "place", "help"),
+    [
+        ("a = Scale(direct, 0.5)", "LN0101", "0.5", "parameters are given by name: NAME"),
+        ("a = 0.5 * direct", "LN0101", "0.5", "a wire is scaled by an operator: Scale(WIRE, factor = 0.5)"),
+        ("a = direct * 0.5", "LN0101", "*", "a wire is scaled by an operator: Scale(WIRE, factor = 0.5)"),
+        ("Scale(direct)", "LN0101", "(", "give what it makes a name: NAME = Scale(...)"),
+        ("a = Scale(direct, factor = 50%)", "LN0104", "50%", None),
+        ("a = Cache(direct)", "LN0102", "Cache", "there are: CachePhotonMap, CachePhotons, CacheQuadTree, "),
+        ("a = CacheQuadTree(direct)", "LN0105", "CacheQuadTree(direct)", 'add: file = "..."'),
+        ("a = CacheQuadTree(direct, file = a.cache)", "LN0104", "a.cache", 'write: "a.cache"'),
+        ("a = WireTap(direct)", "LN0105", "WireTap(direct)", 'add: layer = "..."'),
+        ("tap direct -> a.exr", "LN0101", "a", 'write: "a.exr"'),
+        ("tap direct", "LN0101", "\n", 'say into which file: -> "FILE"'),
+        ('tap direct > "a.exr"', "LN0101", ">", 'a file is named behind an arrow: -> "FILE"'),
+        ("use macros.ln", "LN0101", "macros", 'write: "macros.ln"'),
+        ('tag floor = "Floor"', "LN0101", '"Floor"', 'say of what this is the name: material "Floor" or mesh'),
+        ("a = direct@floor", "LN0101", "@", "a tag restricts an operator by its parameters"),
+        ("a = Scale(direct, to = floor|wall)", "LN0104", "floor|wall", "give both a tag of their own: tag NAME = "),
+        ("p = ParticleTracer(light)\na = NNDensity(p - p)", "LN0201", "p", "add up what it is for: NNDensity(p) - "),
+        ("op M(in) -> Points {\n    out = in\n}", "LN0101", ")", "an input has a representation"),
+        ("op M(n: count = 2) -> Points {\n    out = in\n}", "LN0101", "=", "a parameter has the type of its default"),
+        ("op M(in: Points) {\n    out = in\n}", "LN0101", "{", "say what the macro gives: op NAME(...) -> Points {"),
+        ("op M(in: Points) -> Points {\n    Scale(in)\n}", "LN0101", "(", "give what it makes a name: out = "),
+        ("network n {\n}", "LN0101", "{", "a network has no braces: its statements follow on lines of their own"),
+    ],
+)  # fmt: skip
+def test_help_says_how_to_mend_it(text: str, code: str, place: str, help: str | None, library: Library) -> None:
+    """One message for each of a beginner's mistakes, at its place, with what to write instead."""
+    source = SourceFile("n.ln", f"light = Lights()\ndirect = Direct(light)\n{text}\nimage direct\n")
+    found = [d for d in compile_network(source, library).diagnostics if d.severity == "error"]
+    assert [(d.code, d.span.text) for d in found] == [(code, place)]
+    assert found[0].help[0].startswith(help) if help else "write 0.5" in found[0].message, found[0]

@@ -123,7 +123,8 @@ class _Macros:
         for representation, span in declared:
             if representation is not None and representation not in self.library.representations:
                 report_unknown_representation(representation, self.library, span, self.reporter)
-        if all(e.name != RESULT for e in macro.body):
+        unread = any(d.code == "LN0101" and macro.span.holds(d.span) for d in self.reporter.diagnostics)
+        if all(e.name != RESULT for e in macro.body) and not unread:
             message = f"the macro {quote(macro.name)} has no result"
             self.reporter.error("LN0111", macro.name_span, message, help=f"add an equation: {RESULT} = ...")
 

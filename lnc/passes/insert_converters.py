@@ -90,6 +90,9 @@ class _Inserter:
         if len(terms) == 1:
             return (self._convert(terms[0], wanted, reason, consumer.name, consumer.statement, declared),)
         reason_points = f"a sum is made of {POINTS}" + ("" if wanted == POINTS else f", and {reason}")
+        if (wrong := self._no_sum(terms, wanted)) is not None:
+            self._report_sum(terms, wrong, consumer)
+            return terms
         terms = tuple(
             self._convert(term, POINTS, reason_points, consumer.name, consumer.statement, declared) for term in terms
         )
@@ -97,6 +100,24 @@ class _Inserter:
             return terms
         total = Term(self._sum(terms, reason, consumer, given.span), 1.0, given.span)
         return (self._convert(total, wanted, reason, consumer.name, consumer.statement, declared),)
+
+    def _no_sum(self, terms: tuple[Term, ...], wanted: str) -> Term | None:
+        """The first term that cannot become Points, if what is wanted might be made of each alone."""
+        for term in terms:
+            found = self.representations.get(term.node, POINTS)
+            if not cheapest_chains(self.library, found, POINTS) and cheapest_chains(self.library, found, wanted):
+                return term
+        return None
+
+    def _report_sum(self, terms: tuple[Term, ...], wrong: Term, consumer: Node) -> None:
+        message = f"a sum is made of {POINTS}, '{wrong.node}' is {self.representations[wrong.node]}"
+        related = []
+        source = self.definitions.get(wrong.node)
+        if source is not None and source.span != wrong.span:
+            related.append(Related(source.span, f"'{wrong.node}' is made here"))
+        each = [f"{'-' if t.weight < 0 else '+'} {consumer.op.name}({t.node})" for t in terms]
+        help = f"add up what it is for: {' '.join(each).removeprefix('+ ')}"
+        self.reporter.error("LN0201", wrong.span, message, related=related, help=help)
 
     def _convert(
         self, term: Term, wanted: str, reason: str, base: str, statement: Span, declared: Related | None

@@ -49,10 +49,21 @@ def parameter_value(
         return ParameterValue(parameter, _convert(parameter, value, tags, reporter, broken), value)
     except ValueFault as fault:
         if str(fault):
-            help = did_you_mean(value.name, parameter.choices) if isinstance(value, ast.NameValue) else None
+            help = _help(parameter, value)
             related = [Related(place, "inside of the macro it is used here")] if place else []
             reporter.error("LN0104", value.span, f"'{parameter.name}': {fault}", related=related, help=help)
         return None
+
+
+def _help(parameter: Parameter, value: ast.Value) -> str | None:
+    match parameter.type, value:
+        case "text", ast.NameValue() | ast.PathLiteral():
+            return f'write: "{value.span.text}"'
+        case "tags", ast.PathLiteral(ast.PathUnion()):
+            return 'give both a tag of their own: tag NAME = material "A*" | material "B*"'
+        case _, ast.NameValue(name):
+            return did_you_mean(name, parameter.choices)
+    return None
 
 
 def _convert(

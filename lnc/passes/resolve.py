@@ -341,7 +341,8 @@ class _Resolver:
         if call.op in self.broken or self.reporter.full:
             return
         message = f"no operator is called {quote(call.op)}"
-        help = did_you_mean(call.op, self.library.operators)
+        akin = [name for name in sorted(self.library.operators) if len(call.op) > 3 and call.op in name]
+        help = f"there are: {', '.join(akin)}" if len(akin) > 1 else did_you_mean(call.op, self.library.operators)
         if call.op in self.equations:
             help = f"'{call.op}' is a wire; wires take no arguments"
         self.reporter.error("LN0102", call.op_span, message, help=help or "lnc ops lists all operators")
@@ -437,8 +438,10 @@ class _Resolver:
         if argument is None and parameter.default is None and parameter.type != "tags":
             if _unknown_arguments(call, op):
                 return None  # one of which may be meant
-            message = f"'{call.op}' needs its parameter '{parameter.name}: {parameter.type}'"
-            self.reporter.error("LN0105", call.span, message)
+            message = f"{_meant(call, op)} needs its parameter '{parameter.name}: {parameter.type}'"
+            help = f"add: {parameter.name} = " + ('"..."' if parameter.type == "text" else "...")
+            related = [_declared_here(op, parameter.span)]
+            self.reporter.error("LN0105", call.span, message, related=related, help=help)
             return None
         value = argument.value if argument else None
         place = argument.span if argument and not argument.span.holds(argument.value.span) else None

@@ -283,15 +283,61 @@ class _Parser:
         if before.type == "NUMBER" and token.type == "NAME" and before.end < token.start:
             return f"write a unit without a space: {quote(before.text + token.text)}"
         if at == statement_at + 1 and first.type == "NAME":
-            words = (*STATEMENT_WORDS, *ITEM_WORDS) if self._in_block(at) else STATEMENT_WORDS
-            return did_you_mean(first.text, words) if first.text not in words else None
+            block = self._block(at)
+            if token.text == "(":
+                return f"give what it makes a name: {'out' if block == 'op' else 'NAME'} = {first.text}(...)"
+            words = {"": STATEMENT_WORDS, "op": ()}.get(block, ITEM_WORDS)
+            if first.text not in words:
+                return did_you_mean(first.text, words)
+        if first.text in ("tap", "lightmap", "probe") and "'->'" in expected:
+            return 'say into which file: -> "FILE"'
+        if first.text == "op":
+            return _hint_in_macro_head(token, expected)
+        if first.text == "tag" and token.type == "STRING":
+            kinds = " or ".join(f"{kind} {token.text}" for kind in ("material", "mesh", "node"))
+            return f"say of what this is the name: {kinds}"
+        if first.text == "network" and token.text == "{":
+            return "a network has no braces: its statements follow on lines of their own"
+        if expected == self._name("STRING") and token.type not in (NEWLINE, END):
+            words_left = self.source.text[token.start :].split(None, 1)[0].split(",")[0]
+            return f'write: "{words_left.rstrip(")")}"'
+        return self._hint_in_wire(at, statement_at, expected)
+
+    def _hint_in_wire(self, at: int, statement_at: int, expected: str) -> str | None:
+        """For a number or a tag where a wire is wanted."""
+        token = self.tokens[at]
+        bracket = self._open_bracket(statement_at, at)
+        calls = bracket is not None and self.tokens[self.tokens.index(bracket) - 1].type == "NAME"
+        if token.type == "NUMBER" and "a name" in expected and calls:
+            return f"parameters are given by name: NAME = {token.text}"
+        if token.text in ("*", "/") or (token.type == "NUMBER" and "a name" in expected):
+            return "a wire is scaled by an operator: Scale(WIRE, factor = 0.5)"
+        if token.text == "@":
+            return "a tag restricts an operator by its parameters, such as to = TAG, or an event of a light path: D@TAG"
         return None
 
-    def _in_block(self, at: int) -> bool:
-        depth = 0
-        for token in self.tokens[:at]:
-            depth += (token.text == "{") - (token.text == "}")
-        return depth > 0
+    def _block(self, at: int) -> str:
+        """The word that the innermost open block begins with; empty outside of all blocks."""
+        heads: list[str] = []
+        word = ""
+        for before, token in zip([None, *self.tokens[:at]], self.tokens[:at], strict=False):
+            if before is None or before.type == NEWLINE or before.text in ("{", "}"):
+                word = token.text
+            if token.text == "{":
+                heads.append(word)
+            elif token.text == "}" and heads:
+                heads.pop()
+        return heads[-1] if heads else ""
+
+
+def _hint_in_macro_head(token: Token, expected: str) -> str | None:
+    if token.text in (",", ")") and "':'" in expected:
+        return "an input has a representation (in: Points), a parameter a default (n = 2)"
+    if token.text == "=":
+        return "a parameter has the type of its default: write n = 2"
+    if "'->'" in expected:
+        return "say what the macro gives: op NAME(...) -> Points {"
+    return None
 
 
 def _letters_as_names(tokens: Sequence[Token]) -> set[str]:

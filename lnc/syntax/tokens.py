@@ -172,6 +172,8 @@ def _report_bad_character(source: SourceFile, at: int, reporter: Reporter) -> No
     name = f"'{character}'" if character.isprintable() else "a control character"
     message = f"{name} (U+{ord(character):04X}) cannot stand here"
     help = "names are made of the letters A to Z, digits and _" if character.isalpha() else None
+    if character == ">":
+        help = 'a file is named behind an arrow: -> "FILE"'
     reporter.error("LN0101", Span(source, at, at + 1), message, help=help)
 
 

@@ -40,7 +40,7 @@ def test_the_furnace_has_the_same_irradiance_everywhere(compiled_network, run_pr
 
 
 def test_as_much_light_is_given_as_there_was(compiled_network, run_program):
-    """Direct light of the closed box, on all surfaces: the outside of the room and the insides of the blocks get none."""
+    """Direct light of the closed box, on all surfaces: not on the outside of the room, nor inside of the blocks."""
     text = "cells = PointsToQuadTree(Direct(Lights()), cell = 0.5m)\nambient = AverageAmbient(cells)\nimage ambient\n"
     program = compiled_network("ambient_everywhere", text=text)
     run = run_program(program, SCENES / "closed_box.gltf", "--verify-paths", "--samples", "256")

@@ -121,7 +121,7 @@ def compile_network(
     well_typed = not reporter.failed
     found = contents(typed.network, reporter)
     plan = None if reporter.failed else schedule(typed.network, found)
-    check_paths(_sound(typed, file, reporter), reporter, exact, complete=plan is not None)
+    check_paths(_sound(typed, expanded, reporter), reporter, exact, complete=plan is not None)
     if dump is not None and plan is not None:
         from lnc.syntax.explicit import explicit
 
@@ -137,16 +137,16 @@ def _typed(expanded: Expanded, name: str, library: Library, reporter: Reporter, 
     """Names, types, converters and cycles of a file, or of a macro's body: the part that is right."""
     file = expanded.file
     network = resolve(file, name, library, reporter, expanded.broken | file.broken, body)
-    typed = typecheck(sound_part(network, file, reporter), reporter)
-    typed = insert_converters(_sound(typed, file, reporter), library, reporter)
+    typed = typecheck(sound_part(network, file, expanded.origins, reporter), reporter)
+    typed = insert_converters(_sound(typed, expanded, reporter), library, reporter)
     _check_inserted(typed, reporter)
-    typed = narrow_converters(_sound(typed, file, reporter))
+    typed = narrow_converters(_sound(typed, expanded, reporter))
     check_cycles(typed.network, reporter)
-    return _sound(typed, file, reporter)
+    return _sound(typed, expanded, reporter)
 
 
-def _sound(typed: TypedNetwork, file: ast.File, reporter: Reporter) -> TypedNetwork:
-    return replace(typed, network=sound_part(typed.network, file, reporter))
+def _sound(typed: TypedNetwork, expanded: Expanded, reporter: Reporter) -> TypedNetwork:
+    return replace(typed, network=sound_part(typed.network, expanded.file, expanded.origins, reporter))
 
 
 def _all_diagnostics(reporter: Reporter, expanded: Expanded, library: Library) -> list[Diagnostic]:

@@ -100,6 +100,20 @@ def test_macros_of_other_files_are_checked_where_they_are_called(library: Librar
     assert [r.span.text for r in found[0].related] == ["Wrong"]
 
 
+def test_a_mistake_in_a_call_hides_no_other(library: Library) -> None:
+    text = """op Twice(in: Points, n = 2) -> Points {
+    half = Scale(in, factor = 0.5)
+    out  = Scale(half, factor = n)
+}
+direct  = Direct(Lights())
+wrong   = Twice(direct, n = 5cm)
+depends = Scale(wrong)
+cells   = NNDensity(direct)
+image direct + depends + cells
+"""
+    assert places(check(text, library)) == [("LN0104", "5cm"), ("LN0201", "direct")]
+
+
 def test_macros_that_call_each_other(library: Library) -> None:
     text = "".join(f"op {a}(in: Points) -> Points {{\n    out = {b}(in)\n}}\n" for a, b in ("PQ", "QP", "RR"))
     assert places(check(text, library)) == [("LN0111", "P"), ("LN0111", "R")]

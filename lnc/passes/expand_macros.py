@@ -48,6 +48,7 @@ class Expanded:
 
     file: ast.File
     calls: dict[Span, Span] = field(default_factory=dict)
+    origins: dict[Span, Span] = field(default_factory=dict)  # of statements that come from macros: who called
     broken: frozenset[str] = frozenset()  # wires whose macro call was wrong, which has been reported
     called: frozenset[str] = frozenset()  # macros
     bodies: tuple[Expanded, ...] = ()  # of the file's own macros that are not called
@@ -216,7 +217,9 @@ class _Expander:
 
     def run(self) -> Expanded:
         statements: list[ast.Statement] = []
+        origins: dict[Span, Span] = {}
         for statement in self.file.statements:
+            first = len(statements)
             match statement:
                 case ast.Macro() | ast.Use():
                     continue
@@ -233,8 +236,9 @@ class _Expander:
             while self.pending:
                 equation, instance = self.pending.pop()
                 statements += self._equation(equation, instance)
+            origins |= {made.span: statement.span for made in statements[first:] if made.span != statement.span}
         file = self.file.changed(statements=tuple(statements))
-        return Expanded(file, self.calls, frozenset(self.broken), frozenset(self.called))
+        return Expanded(file, self.calls, origins, frozenset(self.broken), frozenset(self.called))
 
     def _equation(self, equation: ast.Equation, instance: _Instance) -> list[ast.Statement]:
         """The equation without macro calls in it; equations of the macros it calls become pending."""

@@ -11,6 +11,7 @@ be among the mistakes.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from lnc.diagnostics import Reporter
@@ -21,9 +22,10 @@ from lnc.syntax import ast
 RESULTS = (ast.ImageStatement, ast.ProbeStatement, ast.LightmapStatement, ast.Expect)
 
 
-def sound_part(network: Network, file: ast.File, reporter: Reporter) -> Network:
+def sound_part(network: Network, file: ast.File, origins: Mapping[Span, Span], reporter: Reporter) -> Network:
     """The part that no error reaches; nothing where one concerns more than a wire or a result.
 
+    `origins`: of the statements that come from macros, the statement that calls, whose mistakes are theirs.
     Syntax errors leave no statement behind: what they would have defined is in `file.broken`, "" for anything unnamed.
     """
     if not reporter.failed:
@@ -32,7 +34,8 @@ def sound_part(network: Network, file: ast.File, reporter: Reporter) -> Network:
     for diagnostic in reporter.diagnostics:
         if diagnostic.severity != "error" or diagnostic.code == "LN0101":
             continue
-        inside = [s for s in file.statements if _covers(s.span, diagnostic.span)]
+        at = diagnostic.span
+        inside = [s for s in file.statements if s.span.holds(at) or origins.get(s.span, s.span).holds(at)]
         if not inside or not all(isinstance(s, (ast.Equation, ast.TapStatement, *RESULTS)) for s in inside):
             return replace(network, nodes=(), image=None, taps=(), probes=(), lightmaps=(), expectations=())
         wrong += inside
@@ -57,7 +60,3 @@ def sound_part(network: Network, file: ast.File, reporter: Reporter) -> Network:
         lightmaps=network.lightmaps if complete else (),
         expectations=tuple(e for e in network.expectations if (complete if e.wire is None else e.wire in nodes)),
     )
-
-
-def _covers(outer: Span, inner: Span) -> bool:
-    return outer.source is inner.source and outer.start <= inner.start and inner.end <= outer.end

@@ -49,8 +49,10 @@ change = Difference(sum, gather)
 
 photons = ParticleTracer(light, count = 4k, via = (D|S)@!small S?)
 stored  = CachePhotons(photons, file = "photons.lncache")
-sorted  = CacheSortedPhotons(PhotonSurfSort(stored), file = "sorted.lncache")
-map     = CachePhotonMap(KDPhotonTree(photons), file = "map.lncache")
+sheets  = PhotonSurfSort(stored)
+sorted  = CacheSortedPhotons(sheets, file = "sorted.lncache")
+nearest = KDPhotonTree(photons)
+map     = CachePhotonMap(nearest, file = "map.lncache")
 second  = SecondaryTracer(direct, count = 4k, via = S?)
 
 sampled = PointsToQuadTree(direct, depth = 2, samples = 4)
@@ -122,9 +124,11 @@ WIRES = {
     "mis": ["best"],
     "Difference": ["change"],
     "ParticleTracer": ["photons"],
+    "CachePhotonMap": ["map"],
     "CachePhotons": ["stored"],
-    "PhotonSurfSort": ["sorted"],
-    "KDPhotonTree": ["map"],
+    "CacheSortedPhotons": ["sorted"],
+    "PhotonSurfSort": ["sheets"],
+    "KDPhotonTree": ["nearest"],
     "SecondaryTracer": ["second"],
     "PointsToQuadTree": ["sampled"],
     "CacheQuadTree": ["tree"],
@@ -216,7 +220,7 @@ def cases() -> Iterator:
     for operator, wires in WIRES.items():
         for wire in wires:
             name = next(name for name, text in NETWORKS.items() if re.search(rf"^{wire} += ", text, re.M))
-            for surfaces in ("all",) if wire == "map" else CLASSES[name]:
+            for surfaces in ("all",) if wire in ("map", "nearest") else CLASSES[name]:
                 marks = [pytest.mark.slow] if name != "quick" else []
                 yield pytest.param(name, wire, surfaces, id=f"{operator}-{wire}-{surfaces}", marks=marks)
 

@@ -296,13 +296,7 @@ void encode(CacheBytes& out, const QuadTree& tree) {
   out.put(std::uint64_t{faces});
   for (std::uint32_t face = 0; face < faces; ++face) {
     std::vector<QuadTreeNode> nodes;
-    if (tree.lit(face)) nodes.push_back(tree.nodes()[tree.root(face)]);
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      if (nodes[i].leaf()) continue;
-      const std::uint32_t children = nodes[i].children;
-      nodes[i].children = static_cast<std::uint32_t>(nodes.size());
-      for (std::uint32_t k = 0; k < 4; ++k) nodes.push_back(tree.nodes()[children + k]);
-    }
+    if (tree.lit(face)) nodes = tree.face_nodes(face);
     out.put(std::span<const QuadTreeNode>(nodes));
   }
 }

@@ -57,8 +57,8 @@ def test_damage(kept, tmp_path):
     first, _, _ = kept()
     cache = tmp_path / "photons.cache"
     whole = cache.read_bytes()
-    damaged = [b"", b"not a cache at all, but long enough to be one" * 4, whole[:50], whole[:-1], whole + b"x"]
-    for place in (3, 9, 20, 40, 57, 70, 80, 90, 105, 200, len(whole) - 2):
+    damaged = [b"", whole[:5], whole[:50], whole[:-1], whole + b"x"]
+    for place in (9, 20, 40, 57, 70, 80, 90, 105, 200, len(whole) - 2):
         damaged.append(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
     for content in damaged:
         cache.write_bytes(content)
@@ -66,6 +66,16 @@ def test_damage(kept, tmp_path):
         assert picture == first and traced
         assert "this cache is not used" in said
         assert cache.read_bytes() == whole
+
+
+def test_what_is_no_cache_is_not_overwritten(compiled_network, run_program, tmp_path):
+    cache = tmp_path / "photons.cache"
+    for content in (b"my own notes", b"LNCACHE, a story\n" * 20):
+        cache.write_bytes(content)
+        done = run_program(compiled_network("kept", text=NETWORK), SCENES / "cornell_box.gltf", *OPTIONS)
+        assert done.status == 1 and not done.picture.exists()
+        assert "photons.cache: holds something else than a cache, which is not overwritten" in done.stderr
+        assert cache.read_bytes() == content
 
 
 def test_a_cache_that_cannot_be_written_is_a_warning(kept, tmp_path):

@@ -193,9 +193,13 @@ std::string load_cache(const std::string& path, std::string_view representation,
     throw Error("it cannot be read");
   }
   const std::string_view bytes = file.text();
+  const std::string_view magic(kMagic, sizeof kMagic);
+  if (!bytes.starts_with(magic.substr(0, bytes.size())))
+    throw NotACache(printable(path) +
+                    ": holds something else than a cache, which is not overwritten: give the cache another file, or "
+                    "remove this one");
   Header header;
-  if (bytes.size() < sizeof header || !bytes.starts_with(std::string_view(kMagic, sizeof kMagic)))
-    throw Error("it is no cache");
+  if (bytes.size() < sizeof header) throw Error("it is damaged");
   std::memcpy(&header, bytes.data(), sizeof header);
   if (header.version != kVersion) throw Error("it was written by another version of this program");
   if (header.header != fingerprint(header)) throw Error("it is damaged");

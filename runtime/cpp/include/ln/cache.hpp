@@ -138,6 +138,11 @@ const char* cache_name(const IrradianceRecordSets*);
 void encode(CacheBytes& out, const IrradianceRecordSets& sets);
 void decode(CacheReader& in, PrepareContext& context, IrradianceRecordSets& sets);
 
+/// A file that is to hold a cache holds something else: the user's own work, perhaps.
+struct NotACache : Error {
+  using Error::Error;
+};
+
 /// The payload of a cache that was made from `key`; throws Error with the reason if there is none. An empty reason: no such
 /// file.
 std::string load_cache(const std::string& path, std::string_view representation, const CacheKey& key);
@@ -146,7 +151,7 @@ void save_cache(const std::string& path, std::string_view representation, const 
 /// Says why a cache is not used; nothing if `reason` is empty.
 void refuse_cache(const std::string& path, std::string_view reason);
 
-/// The wire in a file, if that can be used.
+/// The wire in a file, if that can be used. Throws NotACache.
 template <class T>
 std::unique_ptr<T> read_cache(PrepareContext& context, const CacheKey& key, const std::string& path) {
   try {
@@ -155,6 +160,8 @@ std::unique_ptr<T> read_cache(PrepareContext& context, const CacheKey& key, cons
     CacheReader in(payload);
     decode(in, context, *found);
     return found;
+  } catch (const NotACache&) {
+    throw;
   } catch (const Error& error) {
     refuse_cache(path, error.what());
     return nullptr;

@@ -154,7 +154,7 @@ def _all_diagnostics(reporter: Reporter, expanded: Expanded, library: Library) -
     found = Reporter(_with_calls(reporter.sorted(), expanded.calls))
     library = with_unknown_sources(library) if expanded.bodies else library
     for body in expanded.bodies:
-        own = Reporter()
+        own = Reporter(list(body.diagnostics))
         _typed(body, "", library, own, body=True)
         for diagnostic in _with_calls(own.sorted(), body.calls):
             found.add(diagnostic)

@@ -114,6 +114,16 @@ image direct + depends + cells
     assert places(check(text, library)) == [("LN0104", "5cm"), ("LN0201", "direct")]
 
 
+def test_a_mistake_in_a_macro_that_is_not_called_hides_none_in_the_network(library: Library) -> None:
+    text = """op Wrong(in: Points) -> Points {
+    out = Scale(elsewhere)
+}
+direct = Direct(Lights())
+image NNDensity(direct)
+"""
+    assert places(check(text, library)) == [("LN0102", "elsewhere"), ("LN0201", "direct")]
+
+
 def test_macros_that_call_each_other(library: Library) -> None:
     text = "".join(f"op {a}(in: Points) -> Points {{\n    out = {b}(in)\n}}\n" for a, b in ("PQ", "QP", "RR"))
     assert places(check(text, library)) == [("LN0111", "P"), ("LN0111", "R")]

@@ -23,7 +23,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
-from lnc.diagnostics import Related, Reporter, did_you_mean, quote
+from lnc.diagnostics import Diagnostic, Related, Reporter, did_you_mean, quote
 from lnc.library import POINTS, Library, snake_case, unknown_source
 from lnc.naming import Names
 from lnc.passes.parameters import letters_or_tag
@@ -52,6 +52,7 @@ class Expanded:
     broken: frozenset[str] = frozenset()  # wires whose macro call was wrong, which has been reported
     called: frozenset[str] = frozenset()  # macros
     bodies: tuple[Expanded, ...] = ()  # of the file's own macros that are not called
+    diagnostics: tuple[Diagnostic, ...] = ()  # of such a body
 
 
 def expand_macros(file: ast.File, library: Library, read: Read, reporter: Reporter) -> Expanded:
@@ -61,7 +62,7 @@ def expand_macros(file: ast.File, library: Library, read: Read, reporter: Report
     macros = _Macros(library, read, reporter)
     macros.collect(file)
     expanded = _Expander(macros, file, library, reporter, _OUTSIDE).run()
-    return replace(expanded, bodies=tuple(_bodies(file, macros, library, reporter, expanded.called)))
+    return replace(expanded, bodies=tuple(_bodies(file, macros, library, expanded.called)))
 
 
 class _Macros:
@@ -124,8 +125,8 @@ class _Macros:
         for representation, span in declared:
             if representation is not None and representation not in self.library.representations:
                 report_unknown_representation(representation, self.library, span, self.reporter)
-        unread = any(d.code == "LN0101" and macro.span.holds(d.span) for d in self.reporter.diagnostics)
-        if all(e.name != RESULT for e in macro.body) and not unread:
+        garbled = any(d.code == "LN0101" and macro.span.holds(d.span) for d in self.reporter.diagnostics)
+        if all(e.name != RESULT for e in macro.body) and not garbled:
             message = f"the macro {quote(macro.name)} has no result"
             self.reporter.error("LN0111", macro.name_span, message, help=f"add an equation: {RESULT} = ...")
 
@@ -144,9 +145,7 @@ _OUTSIDE = _Instance({}, {}, (), None)
 """Where the statements of the file stand, in no macro."""
 
 
-def _bodies(
-    file: ast.File, macros: _Macros, library: Library, reporter: Reporter, called: frozenset[str]
-) -> Iterator[Expanded]:
+def _bodies(file: ast.File, macros: _Macros, library: Library, called: frozenset[str]) -> Iterator[Expanded]:
     """The bodies of macros in a file that are not `called`, those first that no other macro calls: what they call is
     looked at inside of them."""
     own = [s for s in file.statements if isinstance(s, ast.Macro) and macros.found.get(s.name) is s]
@@ -154,25 +153,14 @@ def _bodies(
     for macro in sorted(own, key=lambda m: m.name in inner):
         if macro.name in called:
             continue
-        body = _body(macro, file, macros, library, reporter)
+        body = _body(macro, file, macros, library)
         called |= body.called
         yield body
 
 
-def _body(macro: ast.Macro, file: ast.File, macros: _Macros, library: Library, reporter: Reporter) -> Expanded:
+def _body(macro: ast.Macro, file: ast.File, macros: _Macros, library: Library) -> Expanded:
     """What a macro does with inputs of which only the representation is known, and with its parameters' defaults."""
-    equations = {
-        i.name: ast.Equation(
-            i.name,
-            None,
-            ast.Call(unknown_source(i.representation), (), (), i.span, i.span),
-            ast.Comments(),
-            i.span,
-            i.span,
-        )
-        for i in macro.inputs
-        if i.representation in library.representations
-    }
+    equations = {i.name: _from_unknown(i) for i in macro.inputs if i.representation in library.representations}
     for equation in macro.body:
         equations.setdefault(equation.name, equation)
     wires: dict[str, ast.WireExpression] = {name: ast.WireName(name, e.name_span) for name, e in equations.items()}
@@ -180,9 +168,10 @@ def _body(macro: ast.Macro, file: ast.File, macros: _Macros, library: Library, r
     place = _Instance(wires, values, (macro.name,), macro)
     tags = [s for s in file.statements if isinstance(s, ast.TagStatement)]
     statements = (*tags, *equations.values())
+    reporter = Reporter()
     expander = _Expander(macros, file.changed(statements=statements), library, reporter, place)
     expander.broken |= {i.name for i in macro.inputs}  # where it is none of `wires`
-    expanded = expander.run()
+    expanded = replace(expander.run(), diagnostics=tuple(reporter.diagnostics))
     if not all(isinstance(s, ast.Macro | ast.Use) for s in file.statements):
         return expanded
     # Tags are those of the networks that will use this file: any name may be one.
@@ -194,6 +183,11 @@ def _body(macro: ast.Macro, file: ast.File, macros: _Macros, library: Library, r
     ]
     unique = {n.name: ast.TagStatement(n.name, (), ast.Comments(), n.span, n.span) for n in named}
     return replace(expanded, file=tree.changed(statements=(*unique.values(), *tree.statements)))
+
+
+def _from_unknown(port: ast.MacroInput) -> ast.Equation:
+    call = ast.Call(unknown_source(port.representation), (), (), port.span, port.span)
+    return ast.Equation(port.name, None, call, ast.Comments(), port.span, port.span)
 
 
 class _Expander:

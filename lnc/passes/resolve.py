@@ -169,7 +169,8 @@ class _Resolver:
         return [(str(file.value), file.given.span) for file in given if file and file.given]
 
     def _expectation(self, statement: ast.Expect) -> list[Expectation]:
-        report_unknown_tags(statement.path, self.tags, self.reporter, self.broken)
+        if report_unknown_tags(statement.path, self.tags, self.reporter, self.broken):
+            return []
         wire = statement.wire
         if wire is not None and statement.wire_span is not None:
             terms = self._wire_name(ast.WireName(wire, statement.wire_span))

@@ -22,9 +22,8 @@ class LitSpace {
   }
 
  private:
-  static constexpr float kSmall = 1.0f / 16;                           // extent of cells that are not cut [normalised units]
-  static constexpr std::uint32_t kPoints = 16, kPointsWhereSmall = 4;  // looked at in each cell
-  static constexpr std::uint32_t kWalks = 16, kSteps = 8;              // from each point
+  static constexpr float kSmall = 1.0f / 16;               // extent of cells that are not cut [normalised units]
+  static constexpr std::uint32_t kWalks = 16, kSteps = 8;  // from each point
 
   /// `lit`: the node of the cell in `in`; null where that is dark.
   void grow(Tracer& tracer, std::uint32_t face, std::vector<QuadTreeNode>& nodes, std::size_t node, const DomainCell& cell,
@@ -36,11 +35,12 @@ class LitSpace {
     }
     if (!cut) {
       const SurfaceCell surface = surface_cell(in_.patches().surface(face / 2), cell);
-      const bool small = std::max(glm::length(surface.a), glm::length(surface.b)) < kSmall;
+      const float extent = std::max(glm::length(surface.a), glm::length(surface.b));
+      const std::uint32_t points = extent < kSmall / 4 ? 1 : extent < kSmall ? 4 : 16;
       const std::uint32_t key = hash32(hash32(node_, face), static_cast<std::uint32_t>(node));
-      const float share = share_of(tracer, face, cell, small ? kPointsWhereSmall : kPoints, key);
+      const float share = share_of(tracer, face, cell, points, key);
       nodes[node].value = Color(share);
-      if (small || share == 0 || share == 1) return;
+      if (extent < kSmall || share == 0 || share == 1) return;
     }
     const auto first = static_cast<std::uint32_t>(nodes.size());
     nodes[node].children = first;
@@ -64,7 +64,7 @@ class LitSpace {
     const bool inside = !open(in_.patches().part(face / 2), Patches::is_front(face));
     const std::uint32_t steps = inside ? 1 : kSteps, wanted = inside ? kWalks / 2 + 1 : 1;
     std::uint32_t reached = 0;
-    for (std::uint32_t walk = 0; walk < kWalks && reached < wanted; ++walk)
+    for (std::uint32_t walk = 0; reached < wanted && reached + kWalks - walk >= wanted; ++walk)
       if (walk_reaches_light(tracer, face, st, steps, key, walk)) ++reached;
     return reached == wanted;
   }

@@ -137,7 +137,7 @@ def _typed(expanded: Expanded, name: str, library: Library, reporter: Reporter, 
     """Names, types, converters and cycles of a file, or of a macro's body: the part that is right."""
     file = expanded.file
     network = resolve(file, name, library, reporter, expanded.broken | file.broken, body)
-    typed = typecheck(sound_part(network, file, expanded.origins, reporter), reporter)
+    typed = typecheck(sound_part(network, expanded, reporter), reporter)
     typed = insert_converters(_sound(typed, expanded, reporter), library, reporter)
     _check_inserted(typed, reporter)
     typed = narrow_converters(_sound(typed, expanded, reporter))
@@ -146,7 +146,7 @@ def _typed(expanded: Expanded, name: str, library: Library, reporter: Reporter, 
 
 
 def _sound(typed: TypedNetwork, expanded: Expanded, reporter: Reporter) -> TypedNetwork:
-    return replace(typed, network=sound_part(typed.network, expanded.file, expanded.origins, reporter))
+    return replace(typed, network=sound_part(typed.network, expanded, reporter))
 
 
 def _all_diagnostics(reporter: Reporter, expanded: Expanded, library: Library) -> list[Diagnostic]:

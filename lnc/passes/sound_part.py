@@ -11,31 +11,31 @@ be among the mistakes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 from lnc.diagnostics import Reporter
 from lnc.network import Network, Term
-from lnc.source import Span
+from lnc.passes.expand_macros import Expanded
 from lnc.syntax import ast
 
 RESULTS = (ast.ImageStatement, ast.ProbeStatement, ast.LightmapStatement, ast.Expect)
 
 
-def sound_part(network: Network, file: ast.File, origins: Mapping[Span, Span], reporter: Reporter) -> Network:
+def sound_part(network: Network, expanded: Expanded, reporter: Reporter) -> Network:
     """The part that no error reaches; nothing where one concerns more than a wire or a result.
 
-    `origins`: of the statements that come from macros, the statement that calls, whose mistakes are theirs.
-    Syntax errors leave no statement behind: what they would have defined is in `file.broken`, "" for anything unnamed.
+    The mistakes of a statement that calls macros are also those of what comes from it. Syntax errors leave no statement
+    behind: what they would have defined is in `file.broken`, "" for anything unnamed.
     """
-    if not reporter.failed:
+    if not reporter.failed and not expanded.broken:
         return network
+    file = expanded.file
     wrong: list[ast.Statement] = []
     for diagnostic in reporter.diagnostics:
         if diagnostic.severity != "error" or diagnostic.code == "LN0101":
             continue
         at = diagnostic.span
-        inside = [s for s in file.statements if s.span.holds(at) or origins.get(s.span, s.span).holds(at)]
+        inside = [s for s in file.statements if s.span.holds(at) or expanded.origins.get(s.span, s.span).holds(at)]
         if not inside or not all(isinstance(s, (ast.Equation, ast.TapStatement, *RESULTS)) for s in inside):
             return replace(network, nodes=(), image=None, taps=(), probes=(), lightmaps=(), expectations=())
         wrong += inside

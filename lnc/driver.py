@@ -238,7 +238,7 @@ def _with_calls(diagnostics: list[Diagnostic], calls: dict[Span, Span]) -> list[
     known: set[tuple[str, str]] = set()
     for diagnostic in diagnostics:
         trail: list[Related] = []
-        place: Span | None = diagnostic.span
+        place: Span | None = diagnostic.span if diagnostic.code != "LN0101" else None
         while place is not None:
             place = next((call for macro, call in calls.items() if macro.holds(place)), None)
             if place is not None:

@@ -150,9 +150,11 @@ def test_a_mistake_in_a_macro_that_is_called_twice_is_one_mistake(library: Libra
         ("a = Scale(direct, to = floor|wall)", "LN0104", "floor|wall", "give both a tag of their own: tag NAME = "),
         ("p = ParticleTracer(light)\na = NNDensity(p - p)", "LN0201", "p", "add up what it is for: NNDensity(p) - "),
         ("op M(in) -> Points {\n    out = in\n}", "LN0101", ")", "an input has a representation"),
-        ("op M(n: count = 2) -> Points {\n    out = in\n}", "LN0101", "=", "a parameter has the type of its default"),
+        ("op M(n: count = 2) -> Points {\n    out = in\n}", "LN0101", "=", "an input (in: Points) has no default"),
         ("op M(in: Points) {\n    out = in\n}", "LN0101", "{", "say what the macro gives: op NAME(...) -> Points {"),
         ("op M(in: Points) -> Points {\n    Scale(in)\n}", "LN0101", "(", "give what it makes a name: out = "),
+        ("op M(in: Points) -> Points {\n    image in\n}", "LN0101", "in", "a macro is made of equations"),
+        ('a = Scale(direct, factor = "2")', "LN0104", '"2"', "write it without quotation marks: 2"),
         ("network n {\n}", "LN0101", "{", "a network has no braces: its statements follow on lines of their own"),
     ],
 )  # fmt: skip

@@ -27,7 +27,7 @@ from lnc.diagnostics import Diagnostic, Related, Reporter, did_you_mean, quote
 from lnc.library import POINTS, Library, snake_case, unknown_source
 from lnc.naming import Names
 from lnc.passes.parameters import letters_or_tag
-from lnc.passes.resolve import report_unknown_representation
+from lnc.passes.resolve import GIVE_BY_POSITION, report_unknown_representation
 from lnc.record import Record
 from lnc.source import SourceFile, Span
 from lnc.syntax import ast
@@ -358,7 +358,8 @@ class _Expander:
     ) -> None:
         if len(call.inputs) > len(ports):
             message = f"{quote(macro.name)} takes {len(ports)} wire{'s' if len(ports) != 1 else ''}"
-            self.reporter.error("LN0107", call.inputs[len(ports)].span, message)
+            defined = Related(macro.name_span, f"{quote(macro.name)} is defined here")
+            self.reporter.error("LN0107", call.inputs[len(ports)].span, message, related=[defined])
         given = [
             (port, self._wire(wire, name, instance), self._representation(wire, instance))
             for port, wire in zip(ports, call.inputs, strict=False)
@@ -370,7 +371,7 @@ class _Expander:
             port, value = named[argument.name], argument.value
             if not isinstance(value, ast.NameValue) or not isinstance(replaced.value, ast.NameValue):
                 message = f"{quote(port.name)} is an input: by name it takes a single wire"
-                self.reporter.error("LN0104", value.span, message)
+                self.reporter.error("LN0104", value.span, message, help=GIVE_BY_POSITION)
                 wires[port.name] = ast.WireName(port.name, call.span)
                 self.broken.add(port.name)
                 continue
@@ -434,7 +435,8 @@ class _Expander:
             given.setdefault(argument.name, argument.span)
             if argument.name not in known:
                 message = f"{quote(macro.name)} has no parameter {quote(argument.name)}"
-                help = did_you_mean(argument.name, known)
+                listed = f"it has: {', '.join(i.name for i in macro.inputs)}" if known else "it has none"
+                help = did_you_mean(argument.name, known) or listed
                 self.reporter.error("LN0103", argument.name_span, message, help=help)
             elif argument.name in values:
                 values[argument.name] = argument.value

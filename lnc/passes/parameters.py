@@ -59,6 +59,8 @@ def _help(parameter: Parameter, value: ast.Value) -> str | None:
     match parameter.type, value:
         case "text", ast.NameValue() | ast.PathLiteral():
             return f'write: "{value.span.text}"'
+        case kind, ast.TextValue(text) if kind != "text":
+            return f"write it without quotation marks: {text}"
         case "tags", ast.PathLiteral(ast.PathUnion()):
             return 'give both a tag of their own: tag NAME = material "A*" | material "B*"'
         case _, ast.NameValue(name):

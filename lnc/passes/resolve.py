@@ -26,6 +26,7 @@ from lnc.source import Span
 from lnc.syntax import ast
 
 TAG_KINDS = ("material", "mesh", "node")
+GIVE_BY_POSITION = "give the expression by position, or give it a name in an equation of its own"
 
 
 def resolve(
@@ -402,8 +403,7 @@ class _Resolver:
             return False
         if not isinstance(argument.value, ast.NameValue):
             message = f"'{port.name}' is an input: by name it takes a single wire"
-            help = "give the expression by position, or give it a name in an equation of its own"
-            self.reporter.error("LN0104", argument.value.span, message, help=help)
+            self.reporter.error("LN0104", argument.value.span, message, help=GIVE_BY_POSITION)
             return False
         terms = self._wire_name(ast.WireName(argument.value.name, argument.value.span))
         given[port.name] = Input(port, terms or (), argument.value.span)

@@ -284,6 +284,8 @@ class _Parser:
             return f"write a unit without a space: {quote(before.text + token.text)}"
         if at == statement_at + 1 and first.type == "NAME":
             block = self._block(at)
+            if block == "op" and first.text in STATEMENT_WORDS:
+                return "a macro is made of equations; tags, results and all else belong into the network"
             if token.text == "(":
                 return f"give what it makes a name: {'out' if block == 'op' else 'NAME'} = {first.text}(...)"
             words = {"": STATEMENT_WORDS, "op": ()}.get(block, ITEM_WORDS)
@@ -334,7 +336,7 @@ def _hint_in_macro_head(token: Token, expected: str) -> str | None:
     if token.text in (",", ")") and "':'" in expected:
         return "an input has a representation (in: Points), a parameter a default (n = 2)"
     if token.text == "=":
-        return "a parameter has the type of its default: write n = 2"
+        return "an input (in: Points) has no default, a parameter (n = 2) has the type of its default"
     if "'->'" in expected:
         return "say what the macro gives: op NAME(...) -> Points {"
     return None

@@ -7,6 +7,7 @@
 #include "ln/error.hpp"
 #include "ln/stats.hpp"
 #include "radiosity_gatherer.hpp"
+#include "radiosity_visibility.hpp"
 
 namespace ln {
 
@@ -27,8 +28,11 @@ constexpr float kNear = 3;
 constexpr std::uint32_t kRaysOfHidden = 8;
 /// A point counts as this bright at least, in means of the radiosity, when points are picked for rays.
 constexpr float kFaintest = 1e-3f;
-/// Gathers at leaves: each leaves a few percent of the error that was there before.
-constexpr int kGathers = 2;
+/// Rays of a link that carries as much as it may err, in judging links.
+constexpr float kRaysOfError = 4;
+/// And in each of the gathers at leaves: they leave a few percent of the error that was there before, and the noise of the
+/// last.
+constexpr float kRaysInGathers[] = {1, 8};
 /// Residual of iterations whose result is not the last one.
 constexpr float kRoughly = 0.03f;
 
@@ -60,7 +64,7 @@ class Solver {
     }
     report.elements = shape_.elements.size();
     report.links = links_.size();
-    for (int i = 0; i < kGathers; ++i) correct(report);
+    for (const float rays : kRaysInGathers) correct(rays, report);
     return result();
   }
 
@@ -85,7 +89,7 @@ class Solver {
     if (error_s > allowed && divide_s) return Verdict::divide_source;
 
     const float carried = b * f.mean;
-    const std::uint32_t rays = rays_of(carried / allowed);
+    const std::uint32_t rays = rays_of(carried / allowed, kRaysOfError);
     if ((divide_r || divide_s) && partly_hidden(link, rays, carried / allowed, tracer))
       return divide_r && (r.flat.area >= s.flat.area || !divide_s) ? Verdict::divide_receiver : Verdict::divide_source;
     if (link.rays == 0)
@@ -117,7 +121,7 @@ class Solver {
     const float error = carried * (overlapping ? kOverlapping : std::min(1.0f, 2 * (radius_r + radius_s) / distance));
     if (error > allowed) return divided(link, larger_r);
     if (!(carried > 0)) return Verdict::keep;
-    const std::uint32_t rays = rays_of(carried / allowed);
+    const std::uint32_t rays = rays_of(carried / allowed, kRaysOfError);
     if (partly_hidden(link, rays, carried / allowed, tracer)) return divided(link, larger_r);
     measure_visibility(link, rays, tracer);
     return Verdict::keep;
@@ -145,30 +149,23 @@ class Solver {
     link.rays = rays;
   }
 
-  /// Visibility by a number of rays between pairs of points, which are picked from several times as many by what they exchange:
-  /// near things count more, and see more of each other; what is bright sees other things than what lies in the same shadow.
+  /// Visibility by a number of rays.
   float visibility(const Link& link, std::uint32_t series, std::uint32_t rays, Tracer& tracer) const {
-    constexpr std::uint32_t kFewest = 8, kOfEach = 4, kMost = kOfEach * kMostRays;
     const std::uint32_t key = hash32(link.receiver, hash32(link.source, series));
     const PairSequence sequence(key);
-    const float radius_s = shape_.radius(link.source);
     const bool plain = link.plain();
     const bool near = plain && glm::distance(shape_.center(link.receiver), shape_.center(link.source)) <
-                                   kNear * (radius_s + shape_.radius(link.receiver));
+                                   kNear * (shape_.radius(link.source) + shape_.radius(link.receiver));
     AreaLight seen;
     if (near) {
       const SurfaceCell& cell = shape_.elements[link.source].flat.cell;
       seen = AreaLight(cell.o, DVec3(cell.a), DVec3(cell.b), cell.quad);
     }
-    const float softening = plain ? 0 : 0.25f * sqr(radius_s);  // else very near pairs in clusters would drown the others
-    Hierarchy::Place from[kMost], to[kMost];
-    float sums[kMost];
-    float sum = 0;
-    // In clusters many face away from each other: there are more pairs until two face each other.
-    const std::uint32_t wanted = std::max(kFewest, kOfEach * rays);
-    std::uint32_t pairs = 0;
-    for (; pairs < (sum > 0 || plain ? wanted : kMost); ++pairs) {
-      const std::uint32_t i = pairs;
+    const float softening = plain ? 0 : softening_of(shape_.radius(link.source));
+    Hierarchy::Place from[Candidates::kMost], to[Candidates::kMost];
+    Candidates candidates(rays, 8);
+    while (!candidates.enough()) {
+      const std::uint32_t i = candidates.count();
       const PairOfPoints point = sequence[i];
       from[i] = shape_.place(link.receiver, point.pick.x, point.u);
       float density = 1;  // of the direction to the source, or in proportion to that of the point on it
@@ -181,25 +178,14 @@ class Solver {
       }
       const Vec3 way = to[i].p - from[i].p;
       const float weight = plain ? std::max(kFaintest * light_.mean, light_.brightness(to[i])) : 1.0f;
-      const float facing_r = glm::dot(way, shape_.elements[from[i].element].flat.normal),
-                  facing_s = -glm::dot(way, shape_.elements[to[i].element].flat.normal), distance2 = glm::dot(way, way);
-      if (facing_r > 0 && facing_s > 0 && density > 0)
-        sum += weight * (near ? facing_r / (std::sqrt(distance2) * density)
-                              : facing_r * facing_s / (distance2 * (distance2 + softening)));
-      sums[i] = sum;
+      const Vec3& n = shape_.elements[from[i].element].flat.normal;
+      const Vec3& source_n = shape_.elements[to[i].element].flat.normal;
+      candidates.add(weight *
+                     (near ? exchange_by_direction(way, n, source_n, density) : exchange(way, n, source_n, softening)));
     }
-    if (!(sum > 0)) return 0;
-    std::uint32_t visible = 0, last = kMost;
-    bool last_visible = false;
-    for (std::uint32_t j = 0; j < rays; ++j) {
-      const float target = sum * (static_cast<float>(j) + 0.5f) / static_cast<float>(rays);
-      const auto i = std::min(static_cast<std::uint32_t>(std::upper_bound(sums, sums + pairs, target) - sums), pairs - 1);
-      if (i != last)
-        last_visible = !tracer.occluded(spawn_ray_to(shape_.locate(from[i]), shape_.locate(to[i])), hash32(key, i), node_);
-      last = i;
-      visible += last_visible ? 1 : 0;
-    }
-    return static_cast<float>(visible) / static_cast<float>(rays);
+    return candidates.visible_share([&](std::uint32_t i) {
+      return !tracer.occluded(spawn_ray_to(shape_.locate(from[i]), shape_.locate(to[i])), hash32(key, i), node_);
+    });
   }
 
   /// Replaces links that may err by more than `allowed` [W/m^2].
@@ -308,9 +294,10 @@ class Solver {
 
   /// Deferred correction: gathers once more, at points, and lets links transport only what that has changed. A link is wrong
   /// in the same way all over its receiver; so are its errors' errors, but they are small.
-  void correct(RadiosityReport& report) {
+  void correct(float rays_of_error, RadiosityReport& report) {
     light_.find_spreads();
-    std::vector<Color> change = Gatherer(context_, node_, shape_, links_, light_, options_.error * light_.mean).at_leaves();
+    std::vector<Color> change =
+        Gatherer(context_, node_, shape_, links_, light_, options_.error * light_.mean, rays_of_error).at_leaves();
     const double size = total(change);
     for (std::size_t i = 0; i < change.size(); ++i)
       change[i] = shape_.elements[i].leaf() ? change[i] + shape_.elements[i].source - light_.irradiance[i] : Color(0);

@@ -8,9 +8,17 @@ namespace ln::radiosity {
 
 class Gatherer {
  public:
-  /// `allowed`: what a link may err by [W/m^2]. Spreads and clusters of the light must be known.
-  Gatherer(PrepareContext& context, NodeId node, const Hierarchy& shape, const Links& links, const Light& light, float allowed)
-      : context_(context), node_(node), shape_(shape), links_(links), light_(light), allowed_(allowed) {}
+  /// `allowed`: what a link may err by [W/m^2], `rays_of_error`: rays of one that brings as much. Spreads of the light must
+  /// be known.
+  Gatherer(PrepareContext& context, NodeId node, const Hierarchy& shape, const Links& links, const Light& light, float allowed,
+           float rays_of_error)
+      : context_(context),
+        node_(node),
+        shape_(shape),
+        links_(links),
+        light_(light),
+        allowed_(allowed),
+        rays_of_error_(rays_of_error) {}
 
   /// Irradiance in the middle of each leaf that the radiosity makes, with form factors of and rays from that point; on
   /// large leaves the mean of several points.
@@ -20,6 +28,14 @@ class Gatherer {
   struct Gathered {
     Color E{0};
     float sum = 0;  // of form factors
+
+    Gathered operator*(float f) const { return {E * f, sum * f}; }
+    Gathered operator/(float f) const { return *this * (1 / f); }
+    Gathered& operator+=(const Gathered& other) {
+      E += other.E;
+      sum += other.sum;
+      return *this;
+    }
   };
 
   struct Receiver {
@@ -31,13 +47,10 @@ class Gatherer {
   };
 
   static std::uint32_t points_in(const Element& element);
-  Gathered gather(const Receiver& receiver, const std::vector<Flow>& flows, const std::vector<float>& sums,
-                  Tracer& tracer) const;
-  void add_unoccluded(std::uint32_t element, const Receiver& receiver, Gathered& g) const;
-  Gathered unoccluded(const Link& link, const Flow& flow, float sum, const Receiver& receiver) const;
-  void occlude(Gathered& g, const Link& link, const Receiver& receiver, Tracer& tracer) const;
-  void occlude_at_random(Gathered& g, const Link& link, const Receiver& receiver, float importance, Tracer& tracer) const;
-  float visible_share(const Link& link, const Receiver& receiver, std::uint32_t rays, bool bright, Tracer& tracer) const;
+  Gathered gather(const Receiver& receiver, const Shine& shine, Tracer& tracer) const;
+  Gathered unoccluded(NodeRef source, const Receiver& receiver, const Shine& shine) const;
+  Gathered visible_part(const Gathered& g, const Link& link, const Receiver& receiver, Tracer& tracer) const;
+  float seen(NodeRef source, const Receiver& receiver, std::uint32_t rays, bool bright, Tracer& tracer) const;
   Hierarchy::Place bright_place(NodeRef n, float pick, const Vec2& u) const;
 
   PrepareContext& context_;
@@ -45,7 +58,7 @@ class Gatherer {
   const Hierarchy& shape_;
   const Links& links_;
   const Light& light_;
-  float allowed_;
+  float allowed_, rays_of_error_;
 };
 
 }  // namespace ln::radiosity

@@ -99,6 +99,9 @@ class Hierarchy {
     return is_cluster(n) ? clusters[cluster_index(n)].receives : faces[elements[n].face].receives;
   }
 
+  /// Are surfaces all that the face of an element sees?
+  bool enclosed(std::uint32_t element) const { return faces[elements[element].face].enclosed; }
+
   /// May the element be cut?
   bool divisible(std::uint32_t element) const {
     return !elements[element].leaf() ||

@@ -145,8 +145,7 @@ constexpr float kLargestCorrection = 1.5f;
 
 float sum_correction(const Hierarchy& shape, std::uint32_t element, float sum) {
   if (!(sum > 0)) return 1;
-  const bool closed = shape.faces[shape.elements[element].face].enclosed;
-  return std::clamp(1 / sum, 1 / kLargestCorrection, closed ? kLargestCorrection : 1.0f);
+  return std::clamp(1 / sum, 1 / kLargestCorrection, shape.enclosed(element) ? kLargestCorrection : 1.0f);
 }
 
 }  // namespace ln::radiosity

@@ -77,40 +77,8 @@ class Links {
   std::vector<std::size_t> first_of_element_, first_of_cluster_;
 };
 
-inline constexpr std::uint32_t kMostRays = 16;
-/// Rays of a link that carries as much as it may err.
-inline constexpr float kRaysOfError = 4;
-/// Number of rays for a link that carries so many times what it may err.
-inline std::uint32_t rays_of(float importance) {
-  return static_cast<std::uint32_t>(std::clamp(kRaysOfError * importance, 1.0f, static_cast<float>(kMostRays)));
-}
-
 /// What irradiance on an element is multiplied by whose form factors add up to `sum`: they should to 1 where its face sees
 /// nothing but surfaces, and nowhere to more.
 float sum_correction(const Hierarchy& shape, std::uint32_t element, float sum);
-
-/// Random numbers for a point of each of two things.
-struct PairOfPoints {
-  Vec2 pick, u, v;
-};
-/// Evenly distributed pairs: the additive recurrence of Roberts 2018, "The Unreasonable Effectiveness of Quasirandom
-/// Sequences", in six dimensions, shifted at random. Costs a fraction of Sobol points, and few are looked at.
-class PairSequence {
- public:
-  explicit PairSequence(std::uint32_t key) {
-    for (std::uint32_t k = 0; k < 6; ++k) shift_[k] = hash32(key, k);
-  }
-
-  PairOfPoints operator[](std::uint32_t i) const {
-    // 2^32 / g^k with g^7 = g + 1, so that products are their own fractional parts.
-    constexpr std::uint32_t kStep[6] = {0xe60e2b72u, 0xcebd76d9u, 0xb9c9aa3au, 0xa6f5777fu, 0x9609c71eu, 0x86d516e5u};
-    float x[6];
-    for (std::uint32_t k = 0; k < 6; ++k) x[k] = to_unit_float(shift_[k] + i * kStep[k]);
-    return {{x[0], x[1]}, {x[2], x[3]}, {x[4], x[5]}};
-  }
-
- private:
-  std::uint32_t shift_[6];
-};
 
 }  // namespace ln::radiosity

@@ -337,8 +337,10 @@ void decode(CacheReader& in, PrepareContext& context, TriMesh& mesh) {
   for (const Color& vertex : vertices) mesh.add_vertex(vertex);
   for (std::uint32_t face = 0; face < faces; ++face) {
     const std::vector<MeshTriangle> triangles = in.get_all<MeshTriangle>();
-    for (const MeshTriangle& t : triangles)
+    for (const MeshTriangle& t : triangles) {
       for (const std::uint32_t v : t.vertex) require(v < vertices.size());
+      for (const Vec2& corner : t.corner) require(std::isfinite(corner.x) && std::isfinite(corner.y));  // they are sorted
+    }
     if (!triangles.empty()) mesh.add_triangles(face, triangles);
   }
   require(in.at_end());

@@ -18,16 +18,6 @@ constexpr float kMinDeterminant = 1e-5f;
 /// Photons nearer than this [normalised units] are at one place.
 constexpr float kMinRadius = 1e-6f;
 
-/// Weights c0 + c1 x + c2 y of photons, besides the kernel's: the solution of M c = (1, 0, 0) for the matrix M of moments.
-Vec3 linear_weights(const SurfaceMoments& m) {
-  const float x = m.x / m.one, y = m.y / m.one;
-  const float xx = m.xx / m.one - x * x, xy = m.xy / m.one - x * y, yy = m.yy / m.one - y * y;
-  const float determinant = xx * yy - xy * xy;
-  if (!(determinant > kMinDeterminant)) return {1 / m.one, 0, 0};
-  const float c1 = (xy * y - yy * x) / determinant, c2 = (xy * x - xx * y) / determinant;
-  return Vec3(1 - c1 * x - c2 * y, c1, c2) / m.one;
-}
-
 /// How much two estimates differ [standard errors], if the light is that of the wider one. Then the variance of the narrower
 /// is as much greater as its kernel is smaller, and the photons that they share count once.
 float standard_errors(const LocalEstimate& wider, const LocalEstimate& narrower) {
@@ -67,9 +57,9 @@ class LocalPhotons {
   }
 
   /// The estimate from the photons within `radius`, which are among the first `count`, or among all.
-  LocalEstimate estimate(std::size_t count, float radius, const SurfaceArea& area, TriangleFilter filter) const {
+  LocalEstimate estimate(std::size_t count, float radius, const SurfaceArea& area, std::uint32_t label) const {
     SurfaceCoverage coverage;
-    area.measure(around_, std::max(radius, kMinRadius), PhotonKernel::parabola, coverage, filter);
+    area.measure(around_, std::max(radius, kMinRadius), PhotonKernel::parabola, coverage, label);
     if (!(coverage.area > 0)) return {.radius = radius};
     const Vec3 weights = linear_weights(coverage.moments);
     const float scale = 1 / coverage.radius, inverse_area = sqr(scale);
@@ -105,15 +95,24 @@ class LocalPhotons {
 
 }  // namespace
 
+Vec3 linear_weights(const SurfaceMoments& m) {
+  const float x = m.x / m.one, y = m.y / m.one;
+  const float xx = m.xx / m.one - x * x, xy = m.xy / m.one - x * y, yy = m.yy / m.one - y * y;
+  const float determinant = xx * yy - xy * xy;
+  if (!(determinant > kMinDeterminant)) return {1 / m.one, 0, 0};
+  const float c1 = (xy * y - yy * x) / determinant, c2 = (xy * x - xx * y) / determinant;
+  return Vec3(1 - c1 * x - c2 * y, c1, c2) / m.one;
+}
+
 LocalEstimate local_linear(const PhotonMap& map, std::span<const NearPhoton> photons, const SurfaceArea& area,
-                           const Neighbourhood& around, float radius, TriangleFilter filter) {
+                           const Neighbourhood& around, float radius, std::uint32_t label) {
   LocalPhotons local(map, around);
   local.assign(photons);
-  return local.estimate(photons.size(), radius, area, filter);
+  return local.estimate(photons.size(), radius, area, label);
 }
 
 LocalEstimate adaptive_local_linear(const PhotonMap& map, const SurfaceArea& area, const Neighbourhood& around,
-                                    const KernelRange& range, TriangleFilter filter) {
+                                    const KernelRange& range, std::uint32_t label) {
   NearPhoton found[PhotonMap::capacity(KernelRange::kMost)];
   LocalPhotons photons(map, around);
   LocalEstimate narrower[kMaxKernels], result;
@@ -138,7 +137,7 @@ LocalEstimate adaptive_local_linear(const PhotonMap& map, const SurfaceArea& are
     if (count < wanted && kernels > 0) break;
     const float reach = count < wanted ? kInfinity : std::sqrt(found[wanted - 1].distance2);
     const float radius = kernels == 0 ? std::min(reach, range.narrow_radius) : reach;
-    const LocalEstimate e = photons.estimate(wanted, radius, area, filter);
+    const LocalEstimate e = photons.estimate(wanted, radius, area, label);
     float difference = 0;
     for (int k = 0; k < kernels; ++k) difference = std::max(difference, standard_errors(e, narrower[k]));
     if (difference >= range.different) break;

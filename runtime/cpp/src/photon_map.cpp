@@ -107,14 +107,19 @@ void PhotonMap::search(const Neighbourhood& around, const float& limit, Use&& us
   const Vec3 p = around.point, n = around.normal;
 
   // Neighbours mostly share their normal: decide once for a run of equal ones.
-  std::uint32_t last_normal = 0;
+  std::uint32_t last_bits = 0;
   bool last_agrees = false, any_normal = false;
+  Vec3 last_normal(0);
+  float max_step2 = 0;
   const auto agrees = [&](std::uint32_t bits) {
-    if (!any_normal || bits != last_normal) {
+    if (!any_normal || bits != last_bits) {
       const PackedNormal packed(bits);
-      last_normal = bits;
+      last_bits = bits;
       any_normal = true;
-      last_agrees = packed.front() == around.front && glm::dot(packed.normal(), n) > Neighbourhood::kMinCos;
+      last_normal = packed.normal();
+      const float cosine = glm::dot(last_normal, n);
+      last_agrees = packed.front() == around.front && cosine > Neighbourhood::kMinCos;
+      max_step2 = last_agrees ? sqr(Neighbourhood::max_step(cosine)) : 0;
     }
     return last_agrees;
   };
@@ -150,12 +155,16 @@ void PhotonMap::search(const Neighbourhood& around, const float& limit, Use&& us
     const Block& block = blocks_[range.begin];
     const Lanes x = load(block.x) - p.x, y = load(block.y) - p.y, z = load(block.z) - p.z;
     const Lanes height = x * n.x + y * n.y + z * n.z, distance2 = x * x + y * y + z * z;
-    // height <= slope * distance in the plane, but for rounding
+    // height <= slope * distance in the plane
     constexpr float kSlope2 = Neighbourhood::kMaxSlope * Neighbourhood::kMaxSlope;
-    unsigned near = lane_bits((distance2 < limit) & (height * height * (1 + kSlope2) <= kSlope2 * distance2 + 1e-12f));
+    constexpr float kRounding2 = 1e-12f;
+    unsigned near = lane_bits((distance2 < limit) & (height * height * (1 + kSlope2) <= kSlope2 * distance2 + kRounding2));
     for (; near != 0; near &= near - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(near));
-      if (agrees(block.normal[i])) use(NearPhoton{distance2[i], range.begin * kBlock + i});
+      if (!agrees(block.normal[i])) continue;
+      const float step = height[i] + x[i] * last_normal.x + y[i] * last_normal.y + z[i] * last_normal.z;
+      if (sqr(step) <= max_step2 * (distance2[i] - sqr(height[i])) + kRounding2)
+        use(NearPhoton{distance2[i], range.begin * kBlock + i});
     }
     after_block();
   }

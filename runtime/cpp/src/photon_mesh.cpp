@@ -12,6 +12,7 @@
 #include "ln/stats.hpp"
 #include "ln/surface_density.hpp"
 #include "ln/text.hpp"
+#include "mesh_sites.hpp"
 
 namespace ln {
 
@@ -45,13 +46,6 @@ struct PlaceHash {
   std::size_t operator()(const Place& p) const {
     return hash32(hash32(p.face, std::bit_cast<std::uint32_t>(p.st.x)), std::bit_cast<std::uint32_t>(p.st.y));
   }
-};
-
-/// A vertex of the mesh. Where faces meet, each knows it by a place of its own.
-struct Vertex {
-  Neighbourhood around;
-  std::uint32_t surface;
-  KernelRadii radii{};
 };
 
 /// Of a triangle's edges, from corner k to the next: are they to be halved?
@@ -89,7 +83,7 @@ class MeshBuilder {
         sorted_(sorted),
         patches_(*sorted.patches),
         options_(options),
-        area_(context, context.scene().data()),
+        area_(context, context.scene().data(), sorted.sheet_of_triangle),
         surfaces_(sorted.surface_count()) {
     normals_.resize(patches_.size());
     for (std::uint32_t p = 0; p < patches_.size(); ++p) {
@@ -102,6 +96,7 @@ class MeshBuilder {
     sort_photons();
     check_size();
     std::vector<Piece> pieces = whole_faces();
+    choose_sites(pieces);
     for (int level = 0; !pieces.empty(); ++level) {
       choose_radii();
       const std::vector<LongEdges> long_edges = find_long_edges(pieces, level);
@@ -201,6 +196,24 @@ class MeshBuilder {
     return Place{Patches::face(neighbour / 4, Patches::is_front(at.face)), st};
   }
 
+  /// Chooses the kernels of whole faces' vertices, and which of these are estimated.
+  void choose_sites(const std::vector<Piece>& pieces) {
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
+    for (const Piece& piece : pieces) {
+      const std::uint32_t* const v = piece.triangle.vertex;
+      for (std::size_t k = 0; k < 3; ++k) edges.emplace_back(v[k], v[(k + 1) % 3]);
+    }
+    sites_ = MeshSites(
+        context_, vertices_, edges, options_.spacing,
+        [&](const MeshVertex& v) { return surfaces_[v.surface]->radii(v.around); },
+        [&](const MeshVertex& p, const MeshVertex& q, Tracer& tracer) {
+          const float radius = p.radii.mean();
+          return !std::isfinite(radius) ||
+                 !wall_between(p.around.point, q.around.point, p.around.normal, q.around.normal, kWallHeight * radius, tracer);
+        });
+    chosen_ = vertices_.size();
+  }
+
   /// Chooses the kernels of the vertices that are new.
   void choose_radii() {
     const std::size_t begin = chosen_;
@@ -215,15 +228,15 @@ class MeshBuilder {
   /// cracks. The wider one: a kernel that is narrow by chance is alone, and calls for no finer mesh.
   bool too_long(std::uint32_t a, std::uint32_t b, Tracer& tracer) const {
     if (a > b) std::swap(a, b);
-    const Vertex& p = vertices_[a];
-    const Vertex& q = vertices_[b];
+    const MeshVertex& p = vertices_[a];
+    const MeshVertex& q = vertices_[b];
     const float length = glm::distance(p.around.point, q.around.point), radius = std::max(p.radii.mean(), q.radii.mean());
     if (length > options_.spacing * radius) return true;
     if (!(length > kWallSpacing * options_.spacing * radius)) return false;
     return wall_between(p.around.point, q.around.point, p.around.normal, q.around.normal, kWallHeight * radius, tracer);
   }
 
-  /// Does a wall stand between two points of a surface with these normals?
+  /// Does a wall stand between two points of a surface with these normals? What goes on from the first is none.
   bool wall_between(const Vec3& a, const Vec3& b, const Vec3& normal_a, const Vec3& normal_b, float height,
                     Tracer& tracer) const {
     const Vec3 start = a + height * normal_a, way = b + height * normal_b - start;
@@ -234,7 +247,8 @@ class MeshBuilder {
     const Hit hit = tracer.intersect(ray, 0, options_.node, RayKind::shadow);
     SurfacePosition wall;
     if (hit.found()) tracer.scene().locate(hit, wall);
-    return hit.found() && std::abs(glm::dot(wall.ng, direction)) > kWallMinCos;
+    return hit.found() && std::abs(glm::dot(wall.ng, direction)) > kWallMinCos &&
+           !(std::abs(glm::dot(wall.ng, normal_a)) > Neighbourhood::kMinCos);
   }
 
   /// By piece.
@@ -328,7 +342,7 @@ class MeshBuilder {
   /// A point near a triangle's corner, inside of it.
   Vec3 inside(const Piece& piece, std::size_t k) const {
     const std::uint32_t* const v = piece.triangle.vertex;
-    const Vertex& corner = vertices_[v[k]];
+    const MeshVertex& corner = vertices_[v[k]];
     const Vec3 middle = (vertices_[v[0]].around.point + vertices_[v[1]].around.point + vertices_[v[2]].around.point) / 3.0f;
     const Vec3 way = middle - corner.around.point;
     return corner.around.point + std::min(kWallMaxOffset, kWallOffset * corner.radii.mean() / glm::length(way)) * way;
@@ -363,7 +377,7 @@ class MeshBuilder {
 
   /// Does a wall stand between two triangles beside their common corner?
   bool parted(std::uint32_t x, std::uint32_t y, Tracer& tracer) const {
-    const Vertex& vertex = vertices_[done_[x / 3].triangle.vertex[x % 3]];
+    const MeshVertex& vertex = vertices_[done_[x / 3].triangle.vertex[x % 3]];
     const float radius = vertex.radii.mean();
     const Vec3 n = vertex.around.normal;
     return std::isfinite(radius) &&
@@ -404,7 +418,7 @@ class MeshBuilder {
         is_known[v] = true;
       } else if (mine == Patches::kNone) {
         mine = static_cast<std::uint32_t>(vertices_.size());
-        vertices_.push_back(Vertex(vertices_[v]));
+        vertices_.push_back(MeshVertex(vertices_[v]));
         seen_from.emplace_back(0);
         has_sides.push_back(true);
         has_sides[v] = true;
@@ -419,26 +433,29 @@ class MeshBuilder {
         vertices_[v].radii = surfaces_[vertices_[v].surface]->radii(vertices_[v].around);
       }
     });
+    for (std::uint32_t v = 0; v < vertices_.size(); ++v)
+      if (has_sides[v]) sites_.set_site(v);
   }
 
   /// Gives each vertex the median of its radii and its neighbours': kernels that are narrow by chance are few and apart, those
-  /// along an edge of the light have each other.
+  /// along an edge of the light have each other. Neighbours are ends of the same edge, and sites within reach.
   void pool_radii() {
     std::vector<std::vector<std::uint32_t>> around(vertices_.size());
-    for (std::uint32_t v = 0; v < around.size(); ++v) around[v].push_back(v);
+    const auto add = [&](std::uint32_t v, std::uint32_t w) {
+      if (sites_.is_site(w)) around[v].push_back(w);
+    };
+    for (std::uint32_t v = 0; v < around.size(); ++v) {
+      add(v, v);
+      for (const std::uint32_t w : sites_.reaching(v)) add(v, w);
+    }
     for (const Piece& piece : done_)
-      for (std::size_t k = 0; k < 3; ++k) around[piece.triangle.vertex[k]].push_back(piece.triangle.vertex[(k + 1) % 3]);
+      for (std::size_t k = 0; k < 3; ++k) add(piece.triangle.vertex[k], piece.triangle.vertex[(k + 1) % 3]);
     std::vector<KernelRadii> pooled(vertices_.size());
     context_.for_chunks(vertices_.size(), 1024, [&](std::size_t begin, std::size_t end, Tracer&) {
-      std::vector<float> radii;
       for (std::size_t v = begin; v < end; ++v) {
-        for (std::size_t half = 0; half < 2; ++half) {
-          radii.clear();
-          for (const std::uint32_t w : around[v]) radii.push_back(vertices_[w].radii.half[half]);
-          const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
-          std::nth_element(radii.begin(), middle, radii.end());
-          pooled[v].half[half] = *middle;
-        }
+        std::sort(around[v].begin(), around[v].end());
+        around[v].erase(std::unique(around[v].begin(), around[v].end()), around[v].end());
+        pooled[v] = median_radii(vertices_, around[v]);
       }
     });
     for (std::size_t v = 0; v < vertices_.size(); ++v) vertices_[v].radii = pooled[v];
@@ -447,10 +464,17 @@ class MeshBuilder {
   TriMesh estimate() {
     std::vector<Color> irradiances(vertices_.size());
     std::vector<std::uint8_t> is_buried(vertices_.size(), 0);
+    context_.for_chunks(vertices_.size(), 64, [&](std::size_t begin, std::size_t end, Tracer&) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const MeshVertex& v = vertices_[i];
+        if (sites_.is_site(static_cast<std::uint32_t>(i))) irradiances[i] = surfaces_[v.surface]->irradiance(v.around, v.radii);
+      }
+    });
     context_.for_chunks(vertices_.size(), 64, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
       for (std::size_t i = begin; i < end; ++i) {
-        const Vertex& v = vertices_[i];
-        irradiances[i] = surfaces_[v.surface]->irradiance(v.around, v.radii);
+        const MeshVertex& v = vertices_[i];
+        const auto number = static_cast<std::uint32_t>(i);
+        if (!sites_.is_site(number)) irradiances[i] = sites_.fill(number, vertices_, irradiances);
         is_buried[i] = is_black(irradiances[i]) && buried(tracer, v.around) ? 1 : 0;
       }
     });
@@ -486,7 +510,8 @@ class MeshBuilder {
   SurfaceArea area_;
   std::vector<std::optional<SurfaceDensity>> surfaces_;  // none: without photons
   std::vector<Vec3> normals_;                            // by patch, of its front
-  std::vector<Vertex> vertices_;
+  std::vector<MeshVertex> vertices_;
+  MeshSites sites_;
   std::size_t chosen_ = 0;                                         // vertices that have their radii
   std::unordered_map<Place, std::uint32_t, PlaceHash> middle_at_;  // vertices that halved an edge
   std::vector<Piece> done_;

@@ -13,7 +13,7 @@ constexpr float kSame = 0.75f, kDifferent = 2;
 
 SurfaceDensity::SurfaceDensity(PrepareContext& context, const SurfaceArea& area, const SortedPhotons& sorted,
                                std::uint32_t surface, const SurfaceKernels& kernels)
-    : area_(&area), sheet_{sorted.sheet_of_triangle.data(), surface / 2} {
+    : area_(&area), sheet_(surface / 2) {
   const std::span<const Photon> photons = sorted.on(surface);
   if (photons.size() < 2 * static_cast<std::size_t>(kernels.least)) {
     DVec3 flux(0);

@@ -146,6 +146,19 @@ TEST_CASE("light does not leak below a thin wall") {
         doctest::Approx(1).epsilon(0.03));
 }
 
+TEST_CASE("light does not leak from a plate close above a floor to the shadow below it") {
+  SceneBuilder b;
+  add_floor(b);
+  b.quad({-0.35f, 0.014f, 0.35f}, {0.35f, 0.014f, 0.35f}, {0.35f, 0.014f, -0.35f}, {-0.35f, 0.014f, -0.35f},
+         b.material(Color(0.5f)));
+  b.directional({0, -1, 0}, Color(1));
+  const Estimate e(b.data, 200'000, 60, PhotonKernel::cone, path_automaton<EmptyPath>());
+  REQUIRE(e.density.max_radius() > 5 * 0.004f);  // the plate is well within the ball
+  CHECK(e.mean([](Vec2 u) { return Vec3(0.6f * u.x - 0.3f, 0.01f, 0.6f * u.y - 0.3f); }, kUp) == 0);
+  CHECK(e.mean([](Vec2 u) { return Vec3(0.7f * u.x - 0.35f, 0.014f, 0.7f * u.y - 0.35f); }, kUp) ==
+        doctest::Approx(1).epsilon(0.02));
+}
+
 TEST_CASE("no light is gathered from far away") {
   SceneBuilder b;
   b.quad({-1, 0.01f, 0.5f}, {1, 0.01f, 0.5f}, {1, 0.01f, -0.5f}, {-1, 0.01f, -0.5f}, b.material(Color(0.5f)));

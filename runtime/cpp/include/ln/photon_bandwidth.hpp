@@ -17,10 +17,14 @@ struct LocalEstimate {
   float area = 0;    // its integral over the surface
 };
 
+/// Weights c0 + c1 x + c2 y of places, besides the kernel's, with which what is linear comes out as it is: the solution of
+/// M c = (1, 0, 0) for the matrix M of moments.
+Vec3 linear_weights(const SurfaceMoments& m);
+
 /// The parabola over the photons within `radius`, weighted so that an irradiance that is linear over the surface comes out as
-/// it is (Walter et al. 1997; Ruppert and Wand 1994, eq. 2.2). `filter`: the triangles that the photons lie on.
+/// it is (Walter et al. 1997; Ruppert and Wand 1994, eq. 2.2). `label`: of the triangles that the photons lie on.
 LocalEstimate local_linear(const PhotonMap& map, std::span<const NearPhoton> photons, const SurfaceArea& area,
-                           const Neighbourhood& around, float radius, TriangleFilter filter = {});
+                           const Neighbourhood& around, float radius, std::uint32_t label = SurfaceArea::kEverything);
 
 /// How wide kernels may be.
 struct KernelRange {
@@ -42,7 +46,7 @@ KernelRange kernel_range(PrepareContext& context, const PhotonMap& map, int leas
 /// kernel has twice as many photons as the one before; its farthest photon sets the radius and is not counted. The
 /// narrowest is no wider than `narrow_radius`, and has as many photons as lie therein.
 LocalEstimate adaptive_local_linear(const PhotonMap& map, const SurfaceArea& area, const Neighbourhood& around,
-                                    const KernelRange& range, TriangleFilter filter = {});
+                                    const KernelRange& range, std::uint32_t label = SurfaceArea::kEverything);
 
 /// Twice the distance within which nine tenths of the photons find `neighbours` of their neighbourhood.
 float automatic_radius(PrepareContext& context, const PhotonMap& map, int neighbours);

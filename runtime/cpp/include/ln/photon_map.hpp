@@ -18,10 +18,16 @@ struct NearPhoton {
 };
 
 /// Which photons, and which parts of surfaces, tell about the irradiance at a point: those that face the same way, on
-/// the same side of their triangles, and lie in a flat double cone around the tangent plane.
+/// the same side of their triangles, lie in a flat double cone around the tangent plane, and are not a step away. Where a
+/// surface bends evenly, offset . (sum of both normals) is 0, and one crease makes it the tangent of its angle times the
+/// distance, at most; for parallel surfaces, it is twice the distance between them.
 struct Neighbourhood {
   static constexpr float kMinCos = 0.9f;    // between geometric normals
   static constexpr float kMaxSlope = 0.5f;  // height over the tangent plane / distance within it
+  static constexpr float kMaxStep = 0.02f;  // offset . (sum of normals) / distance within the plane, beyond what a crease makes
+
+  /// Greatest |offset . (sum of normals)| / distance within the plane for normals with this cosine.
+  static float max_step(float cosine) { return safe_sqrt(1 - sqr(cosine)) / cosine + kMaxStep; }
 
   Vec3 point{0};
   Vec3 normal{0, 0, 1};  // geometric, on the side where light is wanted; unit length

@@ -1,6 +1,7 @@
 #pragma once
 // How much surface lies around a point: what a sum over photons must be divided by.
 
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -15,14 +16,6 @@ enum class PhotonKernel : std::uint8_t { constant, cone, parabola };
 /// [radii].
 struct SurfaceMoments {
   float one = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-};
-
-/// A part of the scene's triangles: those with `label[triangle] == wanted`; all, if `label` is null.
-struct TriangleFilter {
-  const std::uint32_t* label = nullptr;
-  std::uint32_t wanted = 0;
-
-  bool operator()(std::uint32_t triangle) const { return !label || label[triangle] == wanted; }
 };
 
 /// A wall that stands on the surface around a point, as a line in the tangent plane [radii]: what is behind it does not count.
@@ -59,36 +52,64 @@ struct SurfaceCoverage {
   bool hides(const Vec3& offset) const { return hides(glm::dot(offset, s), glm::dot(offset, t)); }
 };
 
-/// The triangles of a scene, sorted in space.
+/// The triangles of a scene in a tree. What is small against the ball is taken for points, whole branches of the tree at once;
+/// the rest is measured triangle by triangle.
 class SurfaceArea {
  public:
-  SurfaceArea() = default;
-  SurfaceArea(PrepareContext& context, const SceneData& data);
+  static constexpr std::uint32_t kEverything = 0xffffffffu;
 
-  /// Measures the surface of a neighbourhood within `radius`, of the filter's triangles. Where more than `kMaxTriangles` of the
-  /// neighbourhood are that near, the radius is halved until they are not.
+  SurfaceArea() = default;
+  /// `labels`: by triangle, for measuring parts of the scene; none are needed for all of it.
+  SurfaceArea(PrepareContext& context, const SceneData& data, std::span<const std::uint32_t> labels = {});
+
+  /// Measures the surface of a neighbourhood within `radius`, of the triangles with this label. Where more than `kMaxTriangles`
+  /// of the neighbourhood are that near and not small, the radius is halved until they are not.
   void measure(const Neighbourhood& around, float radius, PhotonKernel kernel, SurfaceCoverage& coverage,
-               TriangleFilter filter = {}) const;
+               std::uint32_t label = kEverything) const;
 
   static constexpr int kMaxTriangles = 2048;
 
  private:
   static constexpr std::uint32_t kLeaf = 4, kWidth = 8;
-  /// Bounds of 8 neighbours in a level of the tree: of places, and of unit normals on the front.
-  struct alignas(32) Boxes {
-    float low[3][kWidth], high[3][kWidth], normal_low[3][kWidth], normal_high[3][kWidth];
-  };
+  /// Of a node whose triangles have several labels.
+  static constexpr std::uint32_t kMixed = 0xfffffffeu;
 
-  /// Calls `use(triangle)`, until it returns false, for all that may be of the neighbourhood, or hide parts of it, within
-  /// `radius`.
-  template <class Use>
-  void for_near(const Neighbourhood& around, float radius, Use&& use) const;
+  /// A triangle, or a branch of the tree.
+  struct Piece {
+    Vec3 low{kInfinity}, high{-kInfinity};                // bounds of places
+    Vec3 normal_low{kInfinity}, normal_high{-kInfinity};  // and of unit normals on the front
+    Vec3 center{0}, normal{0};                            // means by area; unit length
+    float area = 0;
+    float spread = 0;  // mean squared distance from the centre
+    std::uint32_t label = kMixed;
+  };
+  /// Eight neighbours in a level of the tree.
+  struct alignas(32) Node {
+    float low[3][kWidth], high[3][kWidth], normal_low[3][kWidth], normal_high[3][kWidth];
+    float center[3][kWidth], normal[3][kWidth], area[kWidth], spread[kWidth];
+    std::uint32_t label[kWidth];
+
+    Piece get(std::size_t lane) const;
+    void set(std::size_t lane, const Piece& piece);
+  };
+  enum class Outcome : std::uint8_t { measured, too_many, too_fine, overlapping };
+
+  static Piece merge(std::span<const Piece> pieces);
+  Piece piece_of(std::uint32_t triangle) const;
+
+  /// Calls `use_piece(piece)` for what is smaller than `piece_size`, and `use_triangle(triangle)` for what is not, of all that
+  /// may be of the neighbourhood, or hide parts of it, within `radius`; until one returns false.
+  template <class UsePiece, class UseTriangle>
+  void for_near(const Neighbourhood& around, float radius, float piece_size, std::uint32_t label, UsePiece&& use_piece,
+                UseTriangle&& use_triangle) const;
   template <PhotonKernel kernel>
-  bool measure_with(const Neighbourhood& around, float radius, TriangleFilter filter, SurfaceCoverage& coverage) const;
+  Outcome measure_with(const Neighbourhood& around, float radius, float piece_size, std::uint32_t label,
+                       SurfaceCoverage& coverage) const;
 
   const SceneData* data_ = nullptr;
-  std::vector<std::uint32_t> triangles_;    // in order of size class and position
-  std::vector<std::vector<Boxes>> levels_;  // [0]: boxes of kLeaf triangles each; the last has one element
+  std::vector<std::uint32_t> labels_;      // by triangle; or none
+  std::vector<std::uint32_t> triangles_;   // in order of size class and position
+  std::vector<std::vector<Node>> levels_;  // [0]: nodes of kLeaf triangles each; the last has one element
 };
 
 }  // namespace ln

@@ -21,7 +21,7 @@ struct SurfaceKernels {
 
 class SurfaceDensity {
  public:
-  /// `area` and `sorted` must outlive the object.
+  /// `area`, labelled by sheet, must outlive the object.
   SurfaceDensity(PrepareContext& context, const SurfaceArea& area, const SortedPhotons& sorted, std::uint32_t surface,
                  const SurfaceKernels& kernels);
 
@@ -37,7 +37,7 @@ class SurfaceDensity {
 
  private:
   const SurfaceArea* area_;
-  TriangleFilter sheet_;
+  std::uint32_t sheet_;
   KernelRange kernels_;  // in each half
   PhotonMap half_[2];    // photons that were traced first, and the rest
   Color even_irradiance_{0};

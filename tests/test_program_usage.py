@@ -93,8 +93,8 @@ def test_help_names_the_parameters(photon_program: Path, tmp_path: Path) -> None
     done = run(photon_program, tmp_path, "--help")
     assert done.returncode == 0
     assert done.stderr == ""
-    assert "photons.count=500k" in done.stdout
-    assert "density.neighbours=100" in done.stdout
+    assert "photons.count=2M" in done.stdout
+    assert "density.neighbours=800" in done.stdout
 
 
 def test_two_names_for_one_file(program: Path, tmp_path: Path) -> None:

@@ -279,6 +279,7 @@ TEST_CASE("kernels whose mesh would not fit into memory are refused at once") {
 TEST_CASE("any number of threads makes the same mesh") {
   SceneBuilder b;
   b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f), Color(1)));
+  b.sphere(Vec3(0.1f, -0.2f, 0), 0.2f, b.material(Color(0.5f)), false, 60);  // finer than kernels
   const Meshed one(b.data, 10'000, path_automaton<AnyPath>(), 1);
   for (const int threads : {2, 5}) {
     const Meshed many(b.data, 10'000, path_automaton<AnyPath>(), threads);

@@ -163,7 +163,9 @@ class Solver {
     }
     const float softening = plain ? 0 : softening_of(shape_.radius(link.source));
     Hierarchy::Place from[Candidates::kMost], to[Candidates::kMost];
-    Candidates candidates(rays, 8);
+    // In clusters many points face away from each other.
+    const std::uint32_t wanted = std::max(8u, 4 * rays);
+    Candidates candidates(rays, wanted, plain ? wanted : Candidates::kMost);
     while (!candidates.enough()) {
       const std::uint32_t i = candidates.count();
       const PairOfPoints point = sequence[i];

@@ -11,9 +11,9 @@ namespace {
 
 /// A source whose leaves differ from its mean by less than this share shines evenly.
 constexpr float kEven = 0.1f;
-/// Gathering goes down to cells and to clusters of these radii, as shares of the distance. Cells that are so small count as
-/// points.
-constexpr float kResolved = 0.12f, kResolvedCluster = 1;
+/// Gathering goes down to cells of this radius, as a share of the distance, which count as points; to larger ones for things in
+/// clusters.
+constexpr float kResolved = 0.12f, kRoughlyResolved = 0.5f;
 /// Leaves of a larger radius, in half diagonals of the scene, gather at several points.
 constexpr float kSmall = 1.0f / 16;
 
@@ -21,6 +21,13 @@ constexpr float kSmall = 1.0f / 16;
 
 std::vector<Color> Gatherer::at_leaves() const {
   const Shine shine(shape_, context_.workers(), light_.radiosity);
+  const std::vector<Color> one(shape_.elements.size(), Color(1));
+  const Shine even(shape_, context_.workers(), one);
+  std::vector<Gathered> from_clusters(links_.size());  // to the centers of the links' receivers, if they faced them
+  context_.workers().parallel_for(links_.size(), 64, [&](std::size_t l) {
+    if (is_cluster(links_[l].source))
+      from_clusters[l] = {links_.flow(links_[l], shine).flow, links_.flow(links_[l], even).flow.x};
+  });
   std::vector<Color> found(shape_.elements.size(), Color(0));
   context_.for_chunks(found.size(), 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
     tracer.enter(node_);
@@ -32,7 +39,7 @@ std::vector<Color> Gatherer::at_leaves() const {
       Gathered mean;
       for (std::uint32_t k = 0; k < points; ++k) {
         const Hierarchy::Place place = points == 1 ? shape_.middle(number) : shape_.place(number, 0, sobol_point(number, 0, k));
-        mean += gather(Receiver(shape_, place), shine, tracer) / static_cast<float>(points);
+        mean += gather(Receiver(shape_, place), from_clusters, tracer) / static_cast<float>(points);
       }
       found[i] = mean.E;
       if (shape_.enclosed(number)) found[i] *= sum_correction(shape_, number, mean.sum);
@@ -47,13 +54,17 @@ std::uint32_t Gatherer::points_in(const Element& element) {
 }
 
 /// What the links of a leaf, and of all that it is a part of, bring to a point of it.
-Gatherer::Gathered Gatherer::gather(const Receiver& receiver, const Shine& shine, Tracer& tracer) const {
+Gatherer::Gathered Gatherer::gather(const Receiver& receiver, const std::vector<Gathered>& from_clusters,
+                                    Tracer& tracer) const {
   Gathered all;
   const auto add_links = [&](NodeRef n) {
     const Links::Range range = links_.to(n);
     for (std::size_t l = range.first; l < range.end; ++l) {
-      const Gathered g = unoccluded(links_[l].source, receiver, shine);
-      if (g.sum > 0) all += visible_part(g, links_[l], receiver, tracer);
+      const Link& link = links_[l];
+      const Gathered g = is_cluster(link.source)
+                             ? from_clusters[l] * towards(link, receiver)
+                             : unoccluded(link.source, receiver, link.plain() ? kResolved : kRoughlyResolved);
+      if (g.sum > 0) all += visible_part(g, link, receiver, tracer);
     }
   };
   for (std::uint32_t e = receiver.element; e != kNoNode; e = shape_.elements[e].parent) add_links(e);
@@ -62,32 +73,30 @@ Gatherer::Gathered Gatherer::gather(const Receiver& receiver, const Shine& shine
   return all;
 }
 
-/// What an element or a cluster brings if nothing is in between: by its parts where it is near.
-Gatherer::Gathered Gatherer::unoccluded(NodeRef source, const Receiver& receiver, const Shine& shine) const {
-  const Vec3 way = shape_.center(source) - receiver.p;
-  const float radius = shape_.radius(source), distance = glm::length(way), facing = glm::dot(way, receiver.n);
-  if (facing < -radius) return {};
-  Gathered g;
-  if (is_cluster(source)) {
-    if (radius > kResolvedCluster * distance) {
-      for (const NodeRef child : shape_.clusters[cluster_index(source)].child) g += unoccluded(child, receiver, shine);
-    } else if (facing > 0) {
-      const Vec3 towards = way / distance;
-      const float f = facing / distance * kInvPi / sqr(distance);
-      g = {f * shine.towards(source, -towards), f * shape_.projected_area(source, -towards)};
-    }
-    return g;
-  }
+/// What an element brings if nothing is in between: by its parts where it is near, for radiosity varies over it.
+Gatherer::Gathered Gatherer::unoccluded(std::uint32_t source, const Receiver& receiver, float resolved) const {
   const Element& e = shape_.elements[source];
-  if (!e.leaf() && radius > kResolved * distance) {
-    for (std::uint32_t c = e.children; c < e.children + 4; ++c) g += unoccluded(c, receiver, shine);
+  const Vec3 way = e.flat.cell.center() - receiver.p;
+  const float distance = glm::length(way), facing = glm::dot(way, receiver.n);
+  Gathered g;
+  if (!e.leaf() && e.flat.radius > resolved * distance) {
+    for (std::uint32_t c = e.children; c < e.children + 4; ++c) g += unoccluded(c, receiver, resolved);
     return g;
   }
-  const bool far = radius < kResolved * distance && facing > radius;
+  const bool far = e.flat.radius < kResolved * distance && facing > e.flat.radius;
   g.sum = far ? facing * std::max(0.0f, -glm::dot(way, e.flat.normal)) * e.flat.area * kInvPi / sqr(sqr(distance))
               : point_form_factor(receiver.p, receiver.n, e.flat);
   g.E = g.sum * light_.radiosity[source];
   return g;
+}
+
+/// What the flow from a cluster to the center of the link's receiver is multiplied by for a point of it.
+float Gatherer::towards(const Link& link, const Receiver& receiver) const {
+  const Vec3 source = shape_.center(link.source), way = source - receiver.p;
+  const float facing = glm::dot(receiver.n, way), distance2 = glm::dot(way, way);
+  if (!(facing > 0)) return 0;
+  const float least = sqr(shape_.radius(link.source)), far = glm::distance(source, shape_.center(link.receiver));
+  return facing / std::sqrt(distance2) * std::max(sqr(far), least) / std::max(distance2, least);
 }
 
 /// What is not hidden of what a link brings. Of links that deserve a part of a ray some get a whole one, which then counts for
@@ -117,7 +126,9 @@ float Gatherer::seen(NodeRef source, const Receiver& receiver, std::uint32_t ray
   const PairSequence sequence(key);
   const float softening = is_cluster(source) ? softening_of(shape_.radius(source)) : 0;
   Hierarchy::Place to[Candidates::kMost];
-  Candidates candidates(rays, 4);
+  // Few for clusters, which are costly, and of which many points may face away.
+  const std::uint32_t wanted = (is_cluster(source) ? 2 : 4) * rays;
+  Candidates candidates(rays, wanted, 8 * rays);
   while (!candidates.enough()) {
     const std::uint32_t i = candidates.count();
     const PairOfPoints random = sequence[i];

@@ -47,8 +47,9 @@ class Gatherer {
   };
 
   static std::uint32_t points_in(const Element& element);
-  Gathered gather(const Receiver& receiver, const Shine& shine, Tracer& tracer) const;
-  Gathered unoccluded(NodeRef source, const Receiver& receiver, const Shine& shine) const;
+  Gathered gather(const Receiver& receiver, const std::vector<Gathered>& from_clusters, Tracer& tracer) const;
+  Gathered unoccluded(std::uint32_t source, const Receiver& receiver, float resolved) const;
+  float towards(const Link& link, const Receiver& receiver) const;
   Gathered visible_part(const Gathered& g, const Link& link, const Receiver& receiver, Tracer& tracer) const;
   float seen(NodeRef source, const Receiver& receiver, std::uint32_t rays, bool bright, Tracer& tracer) const;
   Hierarchy::Place bright_place(NodeRef n, float pick, const Vec2& u) const;

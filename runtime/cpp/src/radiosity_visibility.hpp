@@ -38,12 +38,12 @@ class Candidates {
  public:
   static constexpr std::uint32_t kMost = 4 * kMostRays;
 
-  /// For so many rays, at least `fewest`.
-  Candidates(std::uint32_t rays, std::uint32_t fewest) : rays_(rays), enough_(std::clamp(4 * rays, fewest, kMost)) {}
+  /// `wanted`: number of candidates, `most`: if none exchange anything until then; at most kMost count.
+  Candidates(std::uint32_t rays, std::uint32_t wanted, std::uint32_t most)
+      : rays_(rays), wanted_(std::min(wanted, kMost)), most_(std::clamp(most, wanted_, kMost)) {}
 
   std::uint32_t count() const { return count_; }
-  /// There are more if none exchange anything: in clusters many points face away from each other.
-  bool enough() const { return count_ >= (sum_ > 0 ? enough_ : kMost); }
+  bool enough() const { return count_ >= (sum_ > 0 ? wanted_ : most_); }
   void add(float exchanged) { up_to_[count_++] = sum_ += exchanged; }
 
   /// Share of the rays for which `visible`(candidate).
@@ -64,7 +64,7 @@ class Candidates {
   }
 
  private:
-  std::uint32_t rays_, enough_, count_ = 0;
+  std::uint32_t rays_, wanted_, most_, count_ = 0;
   float up_to_[kMost];  // sums of what they exchange
   float sum_ = 0;
 };

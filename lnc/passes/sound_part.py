@@ -31,11 +31,12 @@ def sound_part(network: Network, expanded: Expanded, reporter: Reporter) -> Netw
         return network
     file = expanded.file
     wrong: list[ast.Statement] = []
+    places = [(s, s.span, expanded.origins.get(s.span)) for s in file.statements]
     for diagnostic in reporter.diagnostics:
         if diagnostic.severity != "error" or diagnostic.code == "LN0101":
             continue
         at = diagnostic.span
-        inside = [s for s in file.statements if s.span.holds(at) or expanded.origins.get(s.span, s.span).holds(at)]
+        inside = [s for s, span, origin in places if span.holds(at) or (origin is not None and origin.holds(at))]
         if not inside or not all(isinstance(s, (ast.Equation, ast.TapStatement, *RESULTS)) for s in inside):
             return replace(network, nodes=(), image=None, taps=(), probes=(), lightmaps=(), expectations=())
         wrong += inside

@@ -64,7 +64,7 @@ class PathTracing final : public NetworkRun {
 
       // Russian roulette.
       if (!seen) {
-        const float survival = survival_probability(beta, depth);
+        const float survival = survival_probability(beta, at, depth);
         if (survival < 1) {
           if (random.get1(depth, kRoulette) >= survival) return result;
           beta /= survival;

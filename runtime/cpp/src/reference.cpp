@@ -76,6 +76,9 @@ class ReferencePaths {
       const Interaction at(scene_, ray, hit);
       beta *= at.transmittance;
       result += beta * emission(at, rest, departure);
+      const float survival = survival_probability(beta, at, depth - 1);
+      if (survival < 1 && random.get1() >= survival) return result;
+      beta /= survival;
 
       // Read each event backwards: what may come before it?
       States before[kEventCount];
@@ -96,12 +99,6 @@ class ReferencePaths {
       departure.reset();
       if (s.event != kSpecular) departure = Departure{at.at, emitter_side(at), s.pdf_w};
       ray = spawn_ray(at.at, s.direction);
-
-      constexpr std::uint32_t kRouletteFrom = 4;
-      if (depth < kRouletteFrom) continue;
-      const float survival = std::min(max_component(beta), 0.95f);
-      if (random.get1() >= survival) return result;
-      beta /= survival;
     }
   }
 

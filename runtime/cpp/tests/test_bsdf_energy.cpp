@@ -197,6 +197,16 @@ TEST_CASE("special cases are exact") {
       CHECK(down.y == doctest::Approx(red.y * (1 - reflectance) / (eta * eta)).epsilon(1e-3));
     }
   }
+  SUBCASE("a path into a solid is worth what it was outside") {
+    const BsdfParameters white{.roughness = 0, .transmission = 1, .solid = true};
+    const Bsdf entering(white, true), leaving(white, false);
+    BsdfSample s;
+    REQUIRE(entering.sample(wo, 0.999f, {0.5f, 0.5f}, Events::all, Carried::radiance, s));
+    REQUIRE(s.wi.z < 0);
+    CHECK(entering.concentration() == 1);
+    CHECK(s.weight.x * leaving.concentration() == doctest::Approx(1).epsilon(1e-5));
+    CHECK(Bsdf({.roughness = 0, .transmission = 1}, false).concentration() == 1);  // a thin wall
+  }
   SUBCASE("total internal reflection") {
     const Bsdf bsdf({.base_color = red, .roughness = 0, .transmission = 1, .solid = true}, false);
     for (const float angle : {42.0f, 60.0f, 89.0f}) {

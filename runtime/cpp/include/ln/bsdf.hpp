@@ -71,6 +71,9 @@ class Bsdf {
   /// The kinds of lobes that exist, whatever wo.
   Events events() const { return events_; }
 
+  /// Radiance where wo is over what it was outside: n^2 within a solid of index n > 1.
+  float concentration() const { return eta_ < 1 ? 1 / sqr(eta_) : 1; }
+
   /// Is it Lambertian, black included? So it is where the scene has no event but D.
   bool is_lambertian() const { return kind_ == Kind::lambert || !any(events_); }
 

@@ -37,7 +37,7 @@ class Request {
   std::uint32_t depth() const { return depth_; }
   /// Number of steps of recursion that led here.
   std::uint32_t steps() const { return steps_; }
-  /// Share of the answer that reaches the eye: for decisions (roulette, effort), never for results.
+  /// Share of the answer that reaches the eye, of a branch as if it were alone: for decisions (roulette), never for results.
   const Color& beta() const { return beta_; }
   /// The point is seen by the eye, directly or by specular surfaces.
   bool seen() const { return kind_ == RayKind::camera; }
@@ -148,11 +148,13 @@ class Request {
   };
 };
 
-/// Russian roulette at the surface with `depth` surfaces between it and the eye: the probability with which a path goes on that
-/// still carries the share `beta` of the light. Early ends are dear where the light is behind them, late ones cost rays.
-inline float survival_probability(const Color& beta, std::uint32_t depth) {
-  constexpr std::uint32_t kFirst = 4;
-  return depth < kFirst ? 1.0f : std::min(max_component(beta), 0.95f);
+/// Russian roulette at a surface with `depth` surfaces between it and the eye: the probability with which a path goes on that
+/// still carries the share `beta` of the light there. Paths keep a quarter of what they began with: early ends are dear where
+/// the light is behind them, late ones cost rays. Long ones may end where nothing is absorbed, too.
+inline float survival_probability(const Color& beta, const Interaction& at, std::uint32_t depth) {
+  constexpr float kKept = 0.25f, kLargest = 0.95f;
+  constexpr std::uint32_t kLong = 16;
+  return std::min(max_component(beta) * at.bsdf().concentration() / kKept, depth < kLong ? 1.0f : kLargest);
 }
 
 /// Weight of a technique of density `a` beside one of density `b` for the same light (power heuristic; Veach 1997, eq. 9.14).

@@ -19,7 +19,7 @@ LN_NOINLINE Color secondary_light(Tracer& tracer, const SampleStream& random, co
     if (!any(at.bsdf().events() & kVia & kScene)) return Color(0);
 
     Color weight = ray.weight * at.transmittance;
-    const float survival = survival_probability(beta * weight, depth);
+    const float survival = survival_probability(beta * weight, at, depth);
     if (survival < 1) {
       if (random.get1(depth, kRoulette) >= survival) return Color(0);
       weight /= survival;
@@ -40,7 +40,7 @@ LN_NOINLINE Color light_along_directions(Request& request, NodeId node, std::int
     const SampleStream random = request.random().branch(request.depth(), j, n);
     BsdfRay ray;
     if (!request.trace_sample(random, node, ray) || !ray.hit.found()) continue;
-    sum += secondary_light<Via, Request::scene_events>(request.tracer(), random, ray, request.beta() * share, request.depth(),
+    sum += secondary_light<Via, Request::scene_events>(request.tracer(), random, ray, request.beta(), request.depth(),
                                                        request.steps(), from, in);
   }
   return sum * share;

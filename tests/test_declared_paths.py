@@ -45,6 +45,8 @@ sum    = direct + pt
 tapped = WireTap(direct, layer = "direct")
 scaled = Scale(direct, factor = 1)
 best   = mis(direct, Direct(light, samples = 4))
+either = ByDistance(direct, Direct(light, samples = 4), distance = 1m)
+close  = Gather(either)
 change = Difference(sum, gather)
 
 photons = ParticleTracer(light, count = 4k, via = (D|S)@!small S?)
@@ -71,6 +73,7 @@ tap three -> "three.exr"
 tap tapped -> "tapped.exr"
 tap scaled -> "scaled.exr"
 tap best -> "best.exr"
+tap close -> "close.exr"
 tap change -> "change.exr"
 tap second -> "second.ply"
 tap NNDensity(map) -> "map.exr"
@@ -122,6 +125,7 @@ WIRES = {
     "WireTap": ["tapped"],
     "Scale": ["scaled"],
     "mis": ["best"],
+    "ByDistance": ["either", "close"],
     "Difference": ["change"],
     "ParticleTracer": ["photons"],
     "CachePhotonMap": ["map"],

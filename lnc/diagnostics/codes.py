@@ -200,11 +200,11 @@ choice: D and G, for S asks for one exact direction. Radiance can be scattered b
     Page(
         "LN0307",
         "light paths that must be equal",
-        """An operator that weights several estimates of the same light, as mis(a, b) does, needs wires that
-carry the same light paths, each as often and with the same content. One that takes what arrives on a part
-of the scene as a whole, as the mean of AverageAmbient, needs light paths that are the same all over that
-part (its parameter `from`; without it, the scene). The path in the message is a shortest one that is
-counted differently.""",
+        """An operator that takes several estimates of the same light, as mis(a, b) and ByDistance(far, near) do,
+needs wires that carry the same light paths everywhere, each as often and, for mis, with the same content.
+One that takes what arrives on a part of the scene as a whole, as the mean of AverageAmbient, needs light
+paths that are the same all over that part (its parameter `from`; without it, the scene). The path in the
+message is a shortest one that is counted differently.""",
         "light  = Lights()\ndirect = Direct(light)\nbounce = PathTracer(direct)\n"
         "expect <= L (D|G|S)* E\nimage  mis(direct, bounce)\n",
     ),

@@ -12,7 +12,7 @@ On entry: a network that has passed every other check.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
@@ -20,7 +20,7 @@ from itertools import product
 from lnc.diagnostics import Hop, Related, Reporter, Witness
 from lnc.library import CONTENTS, PathRule
 from lnc.network import Expectation, Input, Node, Term, TypedNetwork
-from lnc.passes.path_automaton import PathAutomaton, reads_places
+from lnc.passes.path_automaton import PathAutomaton, reads_places, tag_value
 from lnc.paths.automaton import Dfa, TooLarge, intersection
 from lnc.paths.language import ALL_ARRIVING, ALL_LIGHT, DARK, EMITTERS, EVENTS, Alphabet, path_dfa
 from lnc.paths.regex import Renderer
@@ -338,26 +338,44 @@ class _Checker:
         return shown | {e.wire for e in network.expectations if e.wire is not None}
 
     def _check_equal(self, node: Node) -> None:
-        """LN0307 where the ports of an operator must carry equal light paths and do not."""
+        """LN0307 where ports of an operator must carry equal light paths, everywhere, and do not.
+
+        Each content is compared with its like, unless the operator makes one content of all.
+        """
         ports = [given for given in map(node.input, node.op.equal) if given is not None]
-        for other in ports[1:]:
-            for content in CONTENTS:
-                lights = [
-                    [(state, int(t.weight)) for t in given.terms for state in self.automaton.states_of(t.node, content)]
-                    for given in (ports[0], other)
+        apart = any(rule.content == "unchanged" for rule in node.op.paths if rule.port in node.op.equal)
+        where = self.alphabet.where(tag_value(node, "to"))
+        places = [self.alphabet.events(EVENTS, 1 << c) for c in range(self.alphabet.combinations) if where >> c & 1]
+        groups = [(content,) for content in CONTENTS] if apart else [CONTENTS]
+        for other, contents in product(ports[1:], groups):
+            pairs = [[self._light(given, contents, place) for given in (ports[0], other)] for place in places]
+            anywhere = all(lights == pairs[0] for lights in pairs)
+            for i, (place, lights) in enumerate(zip(places, pairs, strict=True)):
+                found = self._unequal(*lights) if lights not in pairs[:i] else None
+                if found is None:
+                    continue
+                path, *counts = found
+                message = f"'{node.op.name}' takes wires of equal light paths, but {path} is counted"
+                message += f" {counts[0]} and {counts[1]} times"
+                message += "" if anywhere else f" before {self._names(place & self.alphabet.events('D'))[0]}"
+                content = f", as {contents[0]}" if apart else ""
+                related = [
+                    Related(given.span, f"{count} times here{content}")
+                    for given, count in zip((ports[0], other), counts, strict=True)
                 ]
-                found = self._unequal(*lights)
-                if found is not None:
-                    path, *counts = found
-                    message = f"'{node.op.name}' takes wires of equal light paths, but {path} is counted"
-                    message += f" {counts[0]} and {counts[1]} times"
-                    related = [
-                        Related(given.span, f"{count} times here, as {content}")
-                        for given, count in zip((ports[0], other), counts, strict=True)
-                    ]
-                    witness = Witness(path, counts[1], counts[0], ())
-                    self.reporter.error("LN0307", node.span, message, related=related, witness=witness)
-                    break
+                witness = Witness(path, counts[1], counts[0], ())
+                self.reporter.error("LN0307", node.span, message, related=related, witness=witness)
+                return
+
+    def _light(self, given: Input, contents: Sequence[str], place: int) -> Light:
+        """What arrives by an input, with these contents, where the next event is one of `place`."""
+        return [
+            (state, int(term.weight))
+            for term in given.terms
+            for content in contents
+            for state, letters in self.automaton.arriving(term.node, content)
+            if letters & place
+        ]
 
     def _check_places(self, node: Node) -> None:
         """LN0307 where an operator reads light all over a part of the scene, of which some has other light paths."""
@@ -371,12 +389,7 @@ class _Checker:
 
     def _differs(self, node: Node, rule: PathRule, given: Input, content: str) -> bool:
         places = self.automaton.places(node, rule)
-        arriving = [
-            (state, letters, int(term.weight))
-            for term in given.terms
-            for state, letters in self.automaton.arriving(term.node, content)
-        ]
-        lights = [[(state, weight) for state, letters, weight in arriving if letters & place] for place in places]
+        lights = [self._light(given, (content,), place) for place in places]
         for place, light in zip(places, lights, strict=True):
             found = self._unequal(lights[0], light) if light != lights[0] else None
             if found is None:

@@ -22,8 +22,11 @@ struct LepskiDensity {
   template <class Request>
   Color answer(Request& request, const PhotonMap& map) const {
     if (map.empty()) return Color(0);
-    return request.scatter_irradiance(
-        [&](const Interaction& at) { return adaptive_local_linear(map, area_, neighbourhood(at), kernels_).E; });
+    return request.scatter_irradiance([&](const Interaction& at) {
+      const LocalEstimate estimate = adaptive_local_linear(map, area_, neighbourhood(at), kernels_);
+      request.blurred_over(estimate.radius);
+      return estimate.E;
+    });
   }
 
   // State.

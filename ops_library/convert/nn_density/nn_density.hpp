@@ -20,7 +20,11 @@ struct NNDensity {
   template <class Request>
   Color answer(Request& request, const PhotonMap& map) const {
     if (map.empty()) return Color(0);
-    return request.scatter_irradiance([&](const Interaction& at) { return density_.irradiance(neighbourhood(at)); });
+    return request.scatter_irradiance([&](const Interaction& at) {
+      const auto [E, radius] = density_.estimate(neighbourhood(at));
+      request.blurred_over(radius);
+      return E;
+    });
   }
 
   // State.

@@ -24,11 +24,11 @@ PhotonDensity::PhotonDensity(PrepareContext& context, const PhotonMap& map, int 
   max_radius_ = radius > 0 ? radius : automatic_radius(context, map, static_cast<int>(neighbours_));
 }
 
-Color PhotonDensity::irradiance(const Neighbourhood& around) const {
-  if (!map_ || map_->empty()) return Color(0);
+PhotonDensity::Estimate PhotonDensity::estimate(const Neighbourhood& around) const {
+  if (!map_ || map_->empty()) return {};
   Found found;
   std::size_t n = map_->nearest(around, sqr(max_radius_), neighbours_, found.photons);
-  if (n == 0) return Color(0);
+  if (n == 0) return {.radius = max_radius_};
 
   // The farthest of `neighbours` photons sets the radius and is not counted; where there are fewer, the radius is fixed.
   float radius = max_radius_;
@@ -36,7 +36,7 @@ Color PhotonDensity::irradiance(const Neighbourhood& around) const {
 
   SurfaceCoverage coverage;
   surfaces_.measure(around, radius, kernel_, coverage);
-  if (!(coverage.area > 0)) return Color(0);
+  if (!(coverage.area > 0)) return {.radius = radius};
   Color flux(0);
   const float inverse_radius = 1 / coverage.radius;
   for (std::size_t i = 0; i < n; ++i) {
@@ -47,7 +47,7 @@ Color PhotonDensity::irradiance(const Neighbourhood& around) const {
     const float weight = kernel_ == PhotonKernel::constant ? 1 : 1 - distance;
     flux += weight * map_->flux(photon.slot);
   }
-  return flux / coverage.area;
+  return {flux / coverage.area, coverage.radius};
 }
 
 }  // namespace ln

@@ -17,13 +17,13 @@ struct Estimate : Traced {
 
   /// Mean irradiance (first channel) at the points that `place` makes of the unit square.
   double mean(const std::function<Vec3(Vec2)>& place, const Vec3& normal, std::uint32_t n = 4000) const {
-    return mean_over_square([&](Vec2 u) { return static_cast<double>(density.irradiance({place(u), normal, true}).x); }, n);
+    return mean_over_square([&](Vec2 u) { return static_cast<double>(density.estimate({place(u), normal, true}).E.x); }, n);
   }
 
   /// Irradiance (first channel) at what a ray hits.
   double at(const Ray& ray) const {
     const Interaction x(stage.scene, ray, stage.scene.accel().intersect(ray, 0));
-    return static_cast<double>(density.irradiance({x.at.p, x.front ? x.at.ng : -x.at.ng, x.front}).x);
+    return static_cast<double>(density.estimate({x.at.p, x.front ? x.at.ng : -x.at.ng, x.front}).E.x);
   }
 
   PhotonMap map;
@@ -166,9 +166,9 @@ TEST_CASE("no light is gathered from far away") {
   b.directional({0, -1, 0}, Color(1));
   const Estimate e(b.data, 20'000, 60, PhotonKernel::cone, path_automaton<EmptyPath>());
   CHECK(e.density.max_radius() < 0.2f);
-  CHECK(e.density.irradiance({{-0.6f, 0.01f, 0}, kUp, true}) == Color(0));
-  CHECK(e.density.irradiance({{0.6f, 0.01f, 0}, kUp, true}).x > 0.3f);
-  CHECK(e.density.irradiance({{0.6f, 0.01f, 0}, -kUp, false}) == Color(0));  // below the floor
+  CHECK(e.density.estimate({{-0.6f, 0.01f, 0}, kUp, true}).E == Color(0));
+  CHECK(e.density.estimate({{0.6f, 0.01f, 0}, kUp, true}).E.x > 0.3f);
+  CHECK(e.density.estimate({{0.6f, 0.01f, 0}, -kUp, false}).E == Color(0));  // below the floor
 }
 
 TEST_CASE("without photons it is dark; few photons do no harm") {
@@ -176,7 +176,7 @@ TEST_CASE("without photons it is dark; few photons do no harm") {
   b.box(Vec3(-0.5f), Vec3(0.5f), b.material(Color(0.5f), Color(1)));
   for (const std::uint64_t count : {0u, 1u, 2u, 3u, 61u}) {
     const Estimate e(b.data, count);
-    const Color E = e.density.irradiance({{0.1f, -0.5f, 0.2f}, kUp, true});
+    const Color E = e.density.estimate({{0.1f, -0.5f, 0.2f}, kUp, true}).E;
     CHECK(is_finite(E));
     CHECK(min_component(E) >= 0);
   }

@@ -13,8 +13,11 @@ class PhotonDensity {
   /// 0: chosen from the photons. `map` must outlive the object.
   PhotonDensity(PrepareContext& context, const PhotonMap& map, int neighbours, float radius, PhotonKernel kernel);
 
-  /// Irradiance [W/m^2].
-  Color irradiance(const Neighbourhood& around) const;
+  struct Estimate {
+    Color E{0};        // irradiance [W/m^2]
+    float radius = 0;  // of the kernel [normalised units]
+  };
+  Estimate estimate(const Neighbourhood& around) const;
 
   float max_radius() const { return max_radius_; }
 

@@ -27,8 +27,21 @@ class Request {
   static constexpr Events scene_events = kScene;
 
   Request(Tracer& tracer, const SampleStream& random, const Interaction& at, const Color& beta, std::uint32_t depth,
-          RayKind kind, std::uint32_t steps = 0)
-      : tracer_(tracer), random_(random), at_(at), beta_(beta), depth_(depth), steps_(steps), kind_(kind) {}
+          RayKind kind, std::uint32_t steps = 0, float distance = kInfinity)
+      : tracer_(tracer),
+        random_(random),
+        at_(at),
+        beta_(beta),
+        distance_(distance),
+        depth_(depth),
+        steps_(steps),
+        kind_(kind) {}
+
+  /// The same request of a receiver that scatters by D alone, with a shared sample of its own.
+  auto diffuse() const {
+    return Request<kReceives & Events::D, kReceives & Events::D, kScene>(tracer_, random_, at_, beta_, depth_, kind_, steps_,
+                                                                         distance_);
+  }
 
   Tracer& tracer() { return tracer_; }
   const SampleStream& random() const { return random_; }
@@ -39,6 +52,12 @@ class Request {
   std::uint32_t steps() const { return steps_; }
   /// Share of the answer that reaches the eye, of a branch as if it were alone: for decisions (roulette), never for results.
   const Color& beta() const { return beta_; }
+  /// Length of the ray from another surface that led here [normalised units]; infinite where none did.
+  float distance() const { return distance_; }
+  /// An answer says that it is a mean over places up to `radius` [normalised units] from here.
+  void blurred_over(float radius) { blur_ = std::max(blur_, radius); }
+  /// The widest such mean so far.
+  float blur() const { return blur_; }
   /// The point is seen by the eye, directly or by specular surfaces.
   bool seen() const { return kind_ == RayKind::camera; }
 
@@ -140,6 +159,7 @@ class Request {
   const SampleStream& random_;
   const Interaction& at_;
   Color beta_;
+  float distance_, blur_ = 0;
   std::uint32_t depth_, steps_;
   RayKind kind_;
   bool sampled_ = false, valid_ = false, traced_ = false, given_ = false;

@@ -24,8 +24,8 @@ LN_NOINLINE Color secondary_light(Tracer& tracer, const SampleStream& random, co
       if (random.get1(depth, kRoulette) >= survival) return Color(0);
       weight /= survival;
     }
-    Request<kVia & kScene, kVia & kScene, kScene> next(tracer, random, at, beta * weight, depth + 1, RayKind::gather,
-                                                       steps + 1);
+    Request<kVia & kScene, kVia & kScene, kScene> next(tracer, random, at, beta * weight, depth + 1, RayKind::gather, steps + 1,
+                                                       ray.hit.t);
     return weight * in(next);
   });
 }

@@ -39,7 +39,7 @@ std::vector<Color> Gatherer::at_leaves() const {
       Gathered mean;
       for (std::uint32_t k = 0; k < points; ++k) {
         const Hierarchy::Place place = points == 1 ? shape_.middle(number) : shape_.place(number, 0, sobol_point(number, 0, k));
-        mean += gather(Receiver(shape_, place), from_clusters, tracer) / static_cast<float>(points);
+        mean += gather(Receiver(shape_, place, k), from_clusters, tracer) / static_cast<float>(points);
       }
       found[i] = mean.E;
       if (shape_.enclosed(number)) found[i] *= sum_correction(shape_, number, mean.sum);
@@ -108,7 +108,7 @@ Gatherer::Gathered Gatherer::visible_part(const Gathered& g, const Link& link, c
   const float chance = rays_of_error_ * brought / allowed_;
   if (chance < 1) {
     float visible = link.visibility;
-    if (to_unit_float(hash32(receiver.element, hash32(link.receiver, link.source))) < chance)
+    if (to_unit_float(hash32(receiver.key, hash32(link.receiver, link.source))) < chance)
       visible += (seen(link.source, receiver, 1, true, tracer) - visible) / chance;
     return g * visible;
   }
@@ -122,7 +122,7 @@ Gatherer::Gathered Gatherer::visible_part(const Gathered& g, const Link& link, c
 /// The share of rays that get through to points of the source, which are picked by what they bring, or would if it shone
 /// evenly.
 float Gatherer::seen(NodeRef source, const Receiver& receiver, std::uint32_t rays, bool bright, Tracer& tracer) const {
-  const std::uint32_t key = hash32(receiver.element, hash32(source, bright ? 2 : 3));
+  const std::uint32_t key = hash32(receiver.key, hash32(source, bright ? 2 : 3));
   const PairSequence sequence(key);
   const float softening = is_cluster(source) ? softening_of(shape_.radius(source)) : 0;
   Hierarchy::Place to[Candidates::kMost];

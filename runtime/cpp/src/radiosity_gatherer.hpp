@@ -39,9 +39,14 @@ class Gatherer {
   };
 
   struct Receiver {
-    Receiver(const Hierarchy& shape, const Hierarchy::Place& place)
-        : element(place.element), p(place.p), n(shape.elements[place.element].flat.normal), at(shape.locate(place)) {}
-    std::uint32_t element;
+    /// `number`: of the point among those of its leaf.
+    Receiver(const Hierarchy& shape, const Hierarchy::Place& place, std::uint32_t number)
+        : element(place.element),
+          key(hash32(place.element, number)),
+          p(place.p),
+          n(shape.elements[place.element].flat.normal),
+          at(shape.locate(place)) {}
+    std::uint32_t element, key;  // the key is for random numbers
     Vec3 p, n;
     SurfacePosition at;
   };

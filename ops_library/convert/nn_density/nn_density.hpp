@@ -11,10 +11,12 @@ struct NNDensity {
   std::int64_t neighbours = 60;
   float radius = 0;         // [m]; 0: automatic
   std::int32_t kernel = 1;  // choice(constant, cone)
+  std::int64_t every = 0;
 
   void prepare(PrepareContext& context, const PhotonMap& map) {
     const auto unit = static_cast<float>(context.scene().data().unit);
-    density_ = PhotonDensity(context, map, static_cast<int>(neighbours), radius / unit, static_cast<PhotonKernel>(kernel));
+    density_ = PhotonDensity(context, map, static_cast<int>(neighbours), radius / unit, static_cast<PhotonKernel>(kernel),
+                             static_cast<int>(every));
   }
 
   template <class Request>

@@ -12,8 +12,8 @@ namespace {
 /// Photons of a scene and estimates of irradiance from them.
 struct Estimate : Traced {
   explicit Estimate(const SceneData& data, std::uint64_t count, int neighbours = 60, PhotonKernel kernel = PhotonKernel::cone,
-                    const PathAutomaton& via = path_automaton<AnyPath>())
-      : Traced(data, count, via), map(stage.context, photons.hits), density(stage.context, map, neighbours, 0, kernel) {}
+                    const PathAutomaton& via = path_automaton<AnyPath>(), int every = 0)
+      : Traced(data, count, via), map(stage.context, photons.hits), density(stage.context, map, neighbours, 0, kernel, every) {}
 
   /// Mean irradiance (first channel) at the points that `place` makes of the unit square.
   double mean(const std::function<Vec3(Vec2)>& place, const Vec3& normal, std::uint32_t n = 4000) const {
@@ -157,6 +157,22 @@ TEST_CASE("light does not leak from a plate close above a floor to the shadow be
   CHECK(e.mean([](Vec2 u) { return Vec3(0.6f * u.x - 0.3f, 0.01f, 0.6f * u.y - 0.3f); }, kUp) == 0);
   CHECK(e.mean([](Vec2 u) { return Vec3(0.7f * u.x - 0.35f, 0.014f, 0.7f * u.y - 0.35f); }, kUp) ==
         doctest::Approx(1).epsilon(0.02));
+}
+
+TEST_CASE("estimates made beforehand are as bright as those made anew, and shared by points near each other") {
+  SceneBuilder b;
+  b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), b.material(Color(0.5f), Color(1)));
+  const Estimate e(b.data, 300'000, 30, PhotonKernel::cone, path_automaton<AnyPath>(), 4);
+  // About 160,000 photons on the floor: a standard error of 0.3 %.
+  CHECK(e.mean([](Vec2 u) { return Vec3(u.x - 0.5f, -0.4f, 0.6f * u.y - 0.3f); }, kUp, 40'000) ==
+        doctest::Approx(2 * static_cast<double>(kPi)).epsilon(0.009));
+  int shared = 0;
+  for (int i = 0; i < 100; ++i) {
+    const float x = 0.009f * static_cast<float>(i) - 0.45f;
+    const auto estimate = [&](float at) { return e.density.estimate({{at, -0.4f, 0.1f}, kUp, true}).E; };
+    if (estimate(x) == estimate(x + 1e-5f)) ++shared;
+  }
+  CHECK(shared > 80);
 }
 
 TEST_CASE("no light is gathered from far away") {

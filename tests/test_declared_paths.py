@@ -87,6 +87,7 @@ DENSITY = f"""network density
 photons  = ParticleTracer(light, via = (D|S)@!small S?)
 density  = NNDensity(photons)
 constant = NNDensity(photons, kernel = constant)
+every    = NNDensity(photons, every = 4)
 varying  = LepskiDensity(photons)
 fitted   = SurfaceDE(photons)
 reduced  = TriMeshReducer(fitted)
@@ -94,6 +95,7 @@ reduced  = TriMeshReducer(fitted)
 tap reduced -> "reduced.glb"
 tap density -> "density.exr"
 tap constant -> "constant.exr"
+tap every -> "every.exr"
 tap varying -> "varying.exr"
 """
 
@@ -140,7 +142,7 @@ WIRES = {
     "QuadTreeToTriMesh": ["corners"],
     "CacheTriMesh": ["mesh"],
     "TriMeshToPoints": ["smooth"],
-    "NNDensity": ["density", "constant"],
+    "NNDensity": ["density", "constant", "every"],
     "LepskiDensity": ["varying"],
     "SurfaceDE": ["fitted"],
     "TriMeshReducer": ["reduced"],

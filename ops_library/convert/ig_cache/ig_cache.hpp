@@ -69,7 +69,8 @@ struct IGCache {
  private:
   // Records that the eye does not see: wider apart, made from fewer directions.
   static constexpr float kCoarser = 4, kCoarserError = 1, kBeyondShare = 0.125f;
-  static constexpr float kSpotShare = 0.125f;  // of the directions, where something is sampled on the spot for a single request
+  static constexpr float kSpotShare =
+      1.0f / 12;  // of the directions, where something is sampled on the spot for a single request
   // Where they are wanted is found from about so many pixels, of places where others measure, and on all surfaces, then from
   // the records found so far.
   static constexpr std::size_t kProbes = 1024;
@@ -85,7 +86,7 @@ struct IGCache {
     Recursion& recursion = tracer.recursion(node);
     const Recursion before = recursion;
     recursion = {before.depth + 1, wanted};
-    HemisphereRequest request(tracer, where, key, share);
+    HemisphereRequest request(tracer, where, key, share, (share < 1 ? sets_.beyond : sets_.seen).spacing().least_reach(where));
     IrradianceSample result = samples(request);
     recursion = before;
     if (share < 1) result.nearest = kInfinity;  // guards against leaks that are seen only

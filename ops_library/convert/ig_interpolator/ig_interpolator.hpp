@@ -13,25 +13,12 @@ struct IGInterpolator {
   template <class Request>
   Color answer(Request& request, const auto& records) const {
     return request.scatter_irradiance([&](const Interaction& at) {
-      WeightedMean mean{at.at.p, at.frame.n, gradients};
+      InterpolatedIrradiance mean(at.at.p, at.frame.n, gradients);
       RecordRequest query(request.tracer(), request.random(), at, request.depth(), mean);
       records(query);
-      return mean.weight > 0 ? glm::max(mean.sum / mean.weight, Color(0)) : Color(0);
+      return mean.value();
     });
   }
-
- private:
-  struct WeightedMean {
-    Vec3 p, n;
-    bool gradients;
-    Color sum{0};
-    float weight = 0;
-
-    void operator()(const IrradianceRecord& record, float w) {
-      sum += w * (gradients ? record.at(p, n) : record.sample.irradiance);
-      weight += w;
-    }
-  };
 };
 
 }  // namespace ln::ops

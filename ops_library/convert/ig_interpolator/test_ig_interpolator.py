@@ -36,16 +36,18 @@ def picture(compiled_network, run_program):
 def test_agrees_with_path_tracing(compiled_network, picture):
     """The mean and every part of it, within the declared bias; and with far less noise than as many rays make."""
     by_paths = compiled_network("diffuse_paths", text=BY_PATHS)
-    truth, _ = picture(by_paths, "--samples", "512")
+    truths = [picture(by_paths, "--samples", "512", "--seed", seed)[0] for seed in ("2", "3")]
+    truth = np.mean(truths, axis=0)
     noisy, brute_rays = picture(by_paths, "--samples", "64", "--seed", "1")
     smooth, rays = picture(compiled_network("irradiance_gradients"), "--samples", "16")
     assert smooth.mean() == pytest.approx(truth.mean(), rel=0.015)
     np.testing.assert_allclose(blocks(smooth), blocks(truth), rtol=0.04, atol=5e-3 * truth.mean())
 
     def error(image):
-        return ((image - truth) ** 2 / (truth**2 + 0.01)).mean()
+        """Without the noise of the truth: that of its halves is independent."""
+        return ((image - truths[0]) * (image - truths[1]) / (truth**2 + 0.01)).mean()
 
-    assert error(smooth) * rays["gather"] < 0.5 * error(noisy) * brute_rays["gather"]
+    assert error(smooth) * rays["gather"] < 0.4 * error(noisy) * brute_rays["gather"]
 
 
 def test_gradients_pay(compiled_network, picture):

@@ -32,7 +32,7 @@ struct IGSampler {
         cells.push_back({radiance, ray && ray->hit.found() ? ray->hit.t : kInfinity});
       }
     }
-    return integrate(grid, cells, at.frame);
+    return integrate(grid, cells, at.frame, request.step());
   }
 };
 

@@ -7,10 +7,10 @@ namespace ln {
 
 namespace {
 
+constexpr float kLeastDistance = 1e-6f;  // [normalised units]
+
 /// Unit vector at the azimuth `phi` in the plane of the surface.
 Vec3 towards(const Frame& frame, float phi) { return frame.s * std::cos(phi) + frame.t * std::sin(phi); }
-
-float closer(const HemisphereCell& a, const HemisphereCell& b) { return std::max(std::min(a.distance, b.distance), 1e-6f); }
 
 }  // namespace
 
@@ -28,12 +28,15 @@ Vec3 HemisphereGrid::direction(int ring, int sector, const Vec2& u) const {
   return {sin * std::cos(phi), sin * std::sin(phi), safe_sqrt(1 - sin2)};
 }
 
-IrradianceSample integrate(const HemisphereGrid& grid, std::span<const HemisphereCell> cells, const Frame& frame) {
+IrradianceSample integrate(const HemisphereGrid& grid, std::span<const HemisphereCell> cells, const Frame& frame, float step) {
   const auto rings = static_cast<std::size_t>(grid.polar), sectors = static_cast<std::size_t>(grid.azimuth);
   const auto cell = [&](std::size_t ring, std::size_t sector) -> const HemisphereCell& {
     return cells[ring * sectors + sector];
   };
-  const float step = 2 * kPi / static_cast<float>(sectors);
+  const auto closer = [&](const HemisphereCell& a, const HemisphereCell& b) {
+    return std::max({std::min(a.distance, b.distance), step, kLeastDistance});
+  };
+  const float width = 2 * kPi / static_cast<float>(sectors);
 
   // What a ring's borders and its inside contribute, at its polar angles theta: sin^2(theta) = ring / rings.
   struct Ring {
@@ -53,12 +56,12 @@ IrradianceSample integrate(const HemisphereGrid& grid, std::span<const Hemispher
   float inverse_distance = 0;
   for (std::size_t k = 0; k < sectors; ++k) {
     const std::size_t before = (k + sectors - 1) % sectors;
-    const float phi = step * static_cast<float>(k);
+    const float phi = width * static_cast<float>(k);
     Color tilt(0), outwards(0), sideways(0);
     for (std::size_t j = 0; j < rings; ++j) {
       const HemisphereCell& here = cell(j, k);
       sum += here.radiance;
-      inverse_distance += 1 / std::max(here.distance, 1e-6f);
+      inverse_distance += 1 / std::max(here.distance, kLeastDistance);
       result.nearest = std::min(result.nearest, here.distance);
       tilt += here.radiance * ring_of[j].tilt;
       // A border between two cells belongs to the nearer surface, and moves as that one does (Ward and Heckbert 1992, eq. 2).
@@ -69,18 +72,19 @@ IrradianceSample integrate(const HemisphereGrid& grid, std::span<const Hemispher
       const HemisphereCell& neighbour = cell(j, before);
       sideways += (here.radiance - neighbour.radiance) * ((ring_of[j + 1].sin - ring_of[j].sin) / closer(here, neighbour));
     }
-    const Vec3 middle = towards(frame, phi + 0.5f * step), across = towards(frame, phi + 0.5f * step + 0.5f * kPi);
+    const Vec3 middle = towards(frame, phi + 0.5f * width), across = towards(frame, phi + 0.5f * width + 0.5f * kPi);
     const Vec3 border = towards(frame, phi + 0.5f * kPi);
     // Integrated over the cell's azimuths, its vector shrinks to the chord.
-    const float chord = 2 * std::sin(0.5f * step);
+    const float chord = 2 * std::sin(0.5f * width);
     result.rotation += glm::outerProduct(across, tilt) * chord;
-    result.translation += glm::outerProduct(middle, outwards) * step + glm::outerProduct(border, sideways);
+    result.translation += glm::outerProduct(middle, outwards) * width + glm::outerProduct(border, sideways);
   }
   const auto count = static_cast<float>(cells.size());
   result.irradiance = sum * (kPi / count);
   result.distance = inverse_distance > 0 ? count / inverse_distance : kInfinity;
   const float sin = std::sqrt(1 - 0.5f / static_cast<float>(rings));  // in the middle of the lowest ring
-  for (const HemisphereCell& low : cells.last(sectors)) result.horizon.push_back(1 / (sin * std::max(low.distance, 1e-6f)));
+  for (const HemisphereCell& low : cells.last(sectors))
+    result.horizon.push_back(1 / (sin * std::max(low.distance, kLeastDistance)));
   return result;
 }
 

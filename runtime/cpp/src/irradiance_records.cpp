@@ -12,9 +12,9 @@ namespace ln {
 namespace {
 
 /// Gradients that are steeper than the surroundings allow come from noise, or from something that is very near.
-void limit_gradients(IrradianceSample& sample) {
+void limit_gradients(IrradianceSample& sample, float surroundings) {
   for (int c = 0; c < 3; ++c) {
-    const float steepest = sample.irradiance[c] / sample.distance, found = glm::length(sample.translation[c]);
+    const float steepest = sample.irradiance[c] / surroundings, found = glm::length(sample.translation[c]);
     if (found > steepest) sample.translation[c] *= steepest / found;
   }
 }
@@ -72,11 +72,11 @@ void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sampl
       distance = std::min(distance, near.sample.distance + glm::distance(near.p, record.p));
     return false;
   });
-  const float low = spacing_.closest * where.footprint, high = spacing_.farthest * where.footprint;
+  const float low = spacing_.least_reach(where), high = spacing_.farthest * where.footprint;
   record.exact = std::clamp(std::min(spacing_.error * distance, high), least_exact(where), reach_below(where));
   record.reach = std::max(record.exact, low);
   record.sample.distance = record.reach / spacing_.error;
-  limit_gradients(record.sample);
+  limit_gradients(record.sample, surroundings(record));
 
   for_near(record.p, record.n, kFar, [&](const IrradianceRecord& near) {
     if (glm::dot(near.n, record.n) <= 0.5f) return false;
@@ -86,8 +86,8 @@ void IrradianceRecords::add(const Receiver& where, const IrradianceSample& sampl
     if (other.sample.distance > limit) {
       other.reach = std::max(spacing_.error * limit, low);
       other.sample.distance = other.reach / spacing_.error;
-      limit_gradients(other.sample);
     }
+    limit_gradients(other.sample, surroundings(other));
     return false;
   });
   restore(record, record.reach);
@@ -110,7 +110,7 @@ void IrradianceRecords::set_value(std::size_t index, const IrradianceSample& sam
   const float distance = record.sample.distance;
   record.sample = sample;
   record.sample.distance = distance;
-  limit_gradients(record.sample);
+  limit_gradients(record.sample, surroundings(record));
 }
 
 Color IrradianceRecords::mean_irradiance() const {
@@ -139,9 +139,9 @@ bool IrradianceRecords::covers(const Receiver& where) const {
     const float e = error(record, where.p, where.n);
     const bool knows = record.exact <= known + spacing_.error * glm::distance(where.p, record.p);
     if (e < 1 && knows && !hidden(record, where.p)) sum += cover_by(record, where.p, e, kOverlap);
-    return sum > kEnough;
+    return sum > kWanted;
   });
-  return sum > kEnough;
+  return sum > kWanted;
 }
 
 /// A record is in all cells that it may reach of the level whose cells are just as wide as that.

@@ -75,10 +75,10 @@ std::vector<float> found_in(const IrradianceRecords& records) {
   std::vector<float> found;
   for (std::uint32_t i = 0; i < 300; ++i) {
     const Vec3 p(2 * random_pair(i).x - 1, 0, 2 * random_pair(i).y - 1), n(0, 1, 0);
-    Color sum(0);
-    found.push_back(records.visit(p, n, IrradianceRecords::kOverlap,
-                                  [&](const IrradianceRecord& record, float w) { sum += w * record.at(p, n); }));
-    found.insert(found.end(), {sum.x, sum.y, sum.z});
+    InterpolatedIrradiance mean(p, n);
+    found.push_back(records.visit(p, n, IrradianceRecords::kOverlap, mean));
+    const Color E = mean.value();
+    found.insert(found.end(), {E.x, E.y, E.z});
   }
   return found;
 }

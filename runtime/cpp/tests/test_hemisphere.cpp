@@ -6,6 +6,8 @@
 #include <functional>
 #include <vector>
 
+#include "ln/sampling.hpp"
+
 using namespace ln;
 
 namespace {
@@ -137,4 +139,26 @@ TEST_CASE("the horizon of a cube: inverse distances to its walls along the surfa
     const Vec3 along = frame.s * std::cos(phi) + frame.t * std::sin(phi);
     CHECK(1 / sample.horizon[static_cast<std::size_t>(k)] == doctest::Approx(bright_cube(p, along).distance));
   }
+}
+
+TEST_CASE("just above a mottled floor, the gradient over a step is noisy like irradiance, not a hundred times more") {
+  constexpr float kHeight = 1e-3f, kStep = 0.1f;
+  const Frame frame = make_frame(Vec3(1, 0, 0));
+  const HemisphereGrid grid = HemisphereGrid::of(512);
+  double gradient = 0, change = 0;  // squares, over the step; and of differences of two irradiances
+  float last = 0;
+  for (std::uint32_t i = 0; i < 200; ++i) {
+    std::uint32_t seed = hash32(i);
+    const auto mottled = [&](const Vec3& p, const Vec3& w) -> HemisphereCell {
+      if (w.y >= 0) return {Color(1), kInfinity};
+      seed = hash32(seed + 1);
+      return {Color(seed % 2 == 0 ? 2 : 0), -p.y / w.y};
+    };
+    const IrradianceSample sample = integrate(grid, look(mottled, grid, Vec3(0, kHeight, 0), frame), frame, kStep);
+    gradient += static_cast<double>(sqr(kStep) * glm::dot(sample.translation[0], sample.translation[0])) / 200;
+    if (i > 0) change += static_cast<double>(sqr(sample.irradiance.x - last)) / 199;
+    last = sample.irradiance.x;
+  }
+  CHECK(gradient > 0);
+  CHECK(std::sqrt(gradient) < 4 * std::sqrt(change));
 }

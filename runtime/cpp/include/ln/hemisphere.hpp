@@ -36,7 +36,9 @@ struct IrradianceSample {
   std::vector<float> horizon;   // inverse distance along the surface of what the lowest ring saw, sector by sector
 };
 
-/// The irradiance of a surface with the local frame `frame`; `cells` ring by ring.
-IrradianceSample integrate(const HemisphereGrid& grid, std::span<const HemisphereCell> cells, const Frame& frame);
+/// The irradiance of a surface with the local frame `frame`; `cells` ring by ring. The translational gradient is meant for
+/// steps of about this size: what is nearer counts as being so far away, for its borders are left behind on the way.
+IrradianceSample integrate(const HemisphereGrid& grid, std::span<const HemisphereCell> cells, const Frame& frame,
+                           float step = 0);
 
 }  // namespace ln

@@ -6,26 +6,27 @@
 
 namespace ln {
 
-/// "What irradiance arrives there, and how does it change around?" `share`: of the usual number of directions. `depth` as in
-/// Request.
+/// "What irradiance arrives there, and how does it change around?" `share`: of the usual number of directions; `step`: as of
+/// `integrate`; `depth` as in Request.
 class HemisphereRequest {
  public:
   using Answer = IrradianceSample;
 
-  HemisphereRequest(Tracer& tracer, const Receiver& where, std::uint32_t key, float share, std::uint32_t depth = 1)
-      : tracer_(tracer), where_(where), key_(key), share_(share), depth_(depth) {}
+  HemisphereRequest(Tracer& tracer, const Receiver& where, std::uint32_t key, float share, float step, std::uint32_t depth = 1)
+      : tracer_(tracer), where_(where), key_(key), share_(share), step_(step), depth_(depth) {}
 
   Tracer& tracer() { return tracer_; }
   const Receiver& where() const { return where_; }
   std::uint32_t key() const { return key_; }  // of its random numbers
   float share() const { return share_; }
+  float step() const { return step_; }
   std::uint32_t depth() const { return depth_; }
 
  private:
   Tracer& tracer_;
   const Receiver& where_;
   std::uint32_t key_;
-  float share_;
+  float share_, step_;
   std::uint32_t depth_;
 };
 

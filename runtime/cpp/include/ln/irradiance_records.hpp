@@ -28,17 +28,45 @@ struct IrradianceRecord {
   float clear = kInfinity;  // up to there nothing that it saw stands in the way, to whichever side
   float above = kInfinity;  // as of Receiver
   IrradianceSample sample;
+};
 
-  /// Irradiance at a point near the record, extrapolated by its gradients.
-  Color at(const Vec3& point, const Vec3& normal) const {
-    return sample.irradiance + glm::cross(n, normal) * sample.rotation + (point - p) * sample.translation;
+/// Irradiance at a point from records around it. Along the way from a record, irradiance changes by the mean of the gradients
+/// at both ends (trapezoidal rule; that at the point is the records' mean): so curvature does no harm between records, whose
+/// tangents would all lie on one side of it.
+class InterpolatedIrradiance {
+ public:
+  InterpolatedIrradiance(const Vec3& p, const Vec3& n, bool gradients = true) : p_(p), n_(n), gradients_(gradients) {}
+
+  void operator()(const IrradianceRecord& record, float weight) {
+    weight_ += weight;
+    sum_ += weight * record.sample.irradiance;
+    if (!gradients_) return;
+    const Vec3 way = p_ - record.p;
+    sum_ += weight * (glm::cross(record.n, n_) * record.sample.rotation + 0.5f * (way * record.sample.translation));
+    way_ += weight * way;
+    slope_ += weight * record.sample.translation;
   }
+
+  Color value() const {
+    if (!(weight_ > 0)) return Color(0);
+    return glm::max((sum_ + (0.5f / weight_) * (way_ * slope_)) / weight_, Color(0));
+  }
+
+ private:
+  Vec3 p_, n_;
+  bool gradients_;
+  float weight_ = 0;  // sums, each term times its weight
+  Color sum_{0};
+  Vec3 way_{0};
+  glm::mat3 slope_{0.0f};
 };
 
 /// How far records reach: the allowed error times the distance of the surroundings, but within bounds.
 struct RecordSpacing {
   float error = 0.2f;                       // Ward's accuracy a
   float closest = 0.02f, farthest = 0.15f;  // bounds of the reach, as a share of the picture's height where the record is
+
+  float least_reach(const Receiver& where) const { return closest * where.footprint; }
 };
 
 class IrradianceRecords {
@@ -90,8 +118,9 @@ class IrradianceRecords {
 
   static constexpr float kOverlap = 1.4f;  // usual limit: neighbouring records overlap, so that no border shows
   static constexpr float kFar = 3.0f;
-  static constexpr float kEnough =
-      0.1f;  // cover: one record suffices, unless it is far out of its depth, as those in narrow gaps are
+  // Cover: one record suffices, unless it is far out of its depth, as those in corners and narrow gaps are. More is wanted
+  // of places where records are made than of those that are read, which lie between them.
+  static constexpr float kWanted = 0.12f, kEnough = 0.05f;
 
  private:
   /// What shows of most records that they are of no use somewhere; `reach` may have shrunk since.
@@ -154,9 +183,11 @@ class IrradianceRecords {
     return std::max(spacing_.error * kWide * where.above, least_exact(where));
   }
   float least_exact(const Receiver& where) const {
-    constexpr float kLeast = 1.0f / 40;  // of the least reach: bounds the number of records in gaps
-    return kLeast * spacing_.closest * where.footprint;
+    constexpr float kLeast = 1.0f / 40;  // bounds the number of records in gaps
+    return kLeast * spacing_.least_reach(where);
   }
+  /// How far away a record's surroundings are, as its neighbours and its gradient know them.
+  float surroundings(const IrradianceRecord& record) const { return record.exact / spacing_.error; }
 
   void insert(const Entry& entry, std::int32_t node, const Vec3& centre, float half);
 

@@ -110,7 +110,7 @@ def test_the_monolith_computes_the_same(compiled_network, run_program, monolith,
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="counts instructions with valgrind")
 def test_overhead_over_the_monolith(compiled_network, monolith, tmp_path):
-    """At most 5 % more instructions than the program by hand. Small, for passes are cut by time where they take long."""
+    """At most 5 % more instructions than the program by hand; few pixels, so that no pass is cut by time."""
 
     def instructions(program: Path) -> int:
         command = [

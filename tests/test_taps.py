@@ -220,7 +220,7 @@ def test_irradiance_records(compiled_network, run_program, tmp_path):
     i, j = np.nonzero(near & ~np.eye(len(records), dtype=bool))
     assert len(i) > 100
     change = irradiance[j] - irradiance[i]
-    foretold = np.einsum("kcx,kx->kc", slope[i], offset[i, j])
+    foretold = np.einsum("kcx,kx->kc", 0.5 * (slope[i] + slope[j]), offset[i, j])  # as it is interpolated
     assert ((change - foretold) ** 2).mean() < 0.4 * (change**2).mean()
 
 

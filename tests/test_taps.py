@@ -220,8 +220,9 @@ def test_irradiance_records(compiled_network, run_program, tmp_path):
     i, j = np.nonzero(near & ~np.eye(len(records), dtype=bool))
     assert len(i) > 100
     change = irradiance[j] - irradiance[i]
-    foretold = np.einsum("kcx,kx->kc", 0.5 * (slope[i] + slope[j]), offset[i, j])  # as it is interpolated
-    assert ((change - foretold) ** 2).mean() < 0.4 * (change**2).mean()
+    for gradient, left in (slope[i], 0.3), (0.5 * (slope[i] + slope[j]), 0.1):  # the latter is how it is interpolated
+        foretold = np.einsum("kcx,kx->kc", gradient, offset[i, j])
+        assert ((change - foretold) ** 2).mean() < left * (change**2).mean()
 
 
 def test_our_programs_render_what_is_written(compiled_network, run_program, tmp_path):

@@ -86,7 +86,8 @@ struct IGCache {
     Recursion& recursion = tracer.recursion(node);
     const Recursion before = recursion;
     recursion = {before.depth + 1, wanted};
-    HemisphereRequest request(tracer, where, key, share, (share < 1 ? sets_.beyond : sets_.seen).spacing().least_reach(where));
+    const IrradianceRecords& records = share < 1 ? sets_.beyond : sets_.seen;
+    HemisphereRequest request(tracer, where, key, share, IrradianceRecords::kOverlap * records.spacing().least_reach(where));
     IrradianceSample result = samples(request);
     recursion = before;
     if (share < 1) result.nearest = kInfinity;  // guards against leaks that are seen only

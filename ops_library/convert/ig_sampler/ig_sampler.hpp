@@ -29,7 +29,12 @@ struct IGSampler {
         // What a white surface makes of one direction, drawn with the density of its BSDF, is the radiance from there.
         const Color radiance = in(seen);
         const BsdfRay* ray = seen.bsdf_ray(node);
-        cells.push_back({radiance, ray && ray->hit.found() ? ray->hit.t : kInfinity});
+        cells.push_back({radiance});
+        if (!ray || !ray->hit.found()) continue;
+        SurfacePosition there;
+        tracer.scene().locate(ray->hit, there);
+        cells.back().distance = ray->hit.t;
+        cells.back().plane = there.ng / (ray->hit.t * glm::dot(ray->ray.direction, there.ng));
       }
     }
     return integrate(grid, cells, at.frame, request.step());

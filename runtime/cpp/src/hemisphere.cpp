@@ -33,8 +33,19 @@ IrradianceSample integrate(const HemisphereGrid& grid, std::span<const Hemispher
   const auto cell = [&](std::size_t ring, std::size_t sector) -> const HemisphereCell& {
     return cells[ring * sectors + sector];
   };
-  const auto closer = [&](const HemisphereCell& a, const HemisphereCell& b) {
-    return std::max({std::min(a.distance, b.distance), step, kLeastDistance});
+  // Inverse distance of the border between two cells where it crosses the middle of their common side, at `u` of cell
+  // (ring, sector). It belongs to the nearer surface, and moves as that one does (Ward and Heckbert 1992, eq. 2); but a wall
+  // close by is much farther away at its end than where it was seen.
+  const float nearest_inverse = 1 / std::max(step, kLeastDistance);
+  const auto inverse_at = [&](std::size_t ring, std::size_t sector, const Vec2& u, const HemisphereCell& beside) {
+    const HemisphereCell& here = cell(ring, sector);
+    const HemisphereCell& close = here.distance < beside.distance ? here : beside;
+    float inverse = 1 / close.distance;
+    if (close.plane != Vec3(0)) {
+      const Vec3 w = frame.to_world(grid.direction(static_cast<int>(ring), static_cast<int>(sector), u));
+      inverse = std::max(std::min(inverse, glm::dot(w, close.plane)), 1 / std::max(here.distance, beside.distance));
+    }
+    return std::min(inverse, nearest_inverse);
   };
   const float width = 2 * kPi / static_cast<float>(sectors);
 
@@ -64,13 +75,14 @@ IrradianceSample integrate(const HemisphereGrid& grid, std::span<const Hemispher
       inverse_distance += 1 / std::max(here.distance, kLeastDistance);
       result.nearest = std::min(result.nearest, here.distance);
       tilt += here.radiance * ring_of[j].tilt;
-      // A border between two cells belongs to the nearer surface, and moves as that one does (Ward and Heckbert 1992, eq. 2).
       if (j > 0) {
         const HemisphereCell& inner = cell(j - 1, k);
-        outwards += (here.radiance - inner.radiance) * (ring_of[j].sin * ring_of[j].cos2 / closer(here, inner));
+        const float inverse = inverse_at(j, k, Vec2(0.0f, 0.5f), inner);
+        outwards += (here.radiance - inner.radiance) * (ring_of[j].sin * ring_of[j].cos2 * inverse);
       }
       const HemisphereCell& neighbour = cell(j, before);
-      sideways += (here.radiance - neighbour.radiance) * ((ring_of[j + 1].sin - ring_of[j].sin) / closer(here, neighbour));
+      const float inverse = inverse_at(j, k, Vec2(0.5f, 0.0f), neighbour);
+      sideways += (here.radiance - neighbour.radiance) * ((ring_of[j + 1].sin - ring_of[j].sin) * inverse);
     }
     const Vec3 middle = towards(frame, phi + 0.5f * width), across = towards(frame, phi + 0.5f * width + 0.5f * kPi);
     const Vec3 border = towards(frame, phi + 0.5f * kPi);

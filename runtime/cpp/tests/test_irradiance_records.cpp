@@ -64,7 +64,8 @@ struct FootOfWall {
         const SampleStream random(key, static_cast<std::uint32_t>(cells.size()));
         const Vec3 w = frame.to_world(grid.direction(ring, sector, random.get2(0, 0)));
         const float distance = w.y < 0 ? -p.y / w.y : kInfinity;
-        cells.push_back({Color(w.y >= 0 ? kSky : distance * w.z > kShadow ? kFloor : 0), distance});
+        const float floor = distance * w.z > kShadow ? kFloor : 0;
+        cells.push_back({Color(w.y < 0 ? floor : kSky), distance, w.y < 0 ? Vec3(0, -1 / p.y, 0) : Vec3(0)});
       }
     }
     return integrate(grid, cells, frame, step);
@@ -243,7 +244,7 @@ TEST_CASE("at the foot of a wall, in a narrow shadow, light grows upwards evenly
   for (std::uint32_t seed = 0; seed < kSeeds; ++seed) {
     IrradianceRecords records(spacing);
     cover(stage.context, records, wanted, seed, [&](Tracer&, const Receiver& where, std::uint32_t key) {
-      return FootOfWall::sample(where.p, where.n, key, spacing.least_reach(where));
+      return FootOfWall::sample(where.p, where.n, key, IrradianceRecords::kOverlap * spacing.least_reach(where));
     });
     double error = 0;
     std::size_t count = 0;

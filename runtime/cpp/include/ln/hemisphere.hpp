@@ -24,6 +24,7 @@ struct HemisphereGrid {
 struct HemisphereCell {
   Color radiance{0};           // [W/(m^2 sr)]
   float distance = kInfinity;  // [normalised units]
+  Vec3 plane{0};               // tangent plane of what is seen: 1/distance along w is dot(w, plane); 0 if not known
 };
 
 /// Irradiance at a point and how it changes around it. The gradients hold a vector a channel, in world space.

@@ -61,7 +61,7 @@ class LitSpace {
   /// arrives? From the back of a single-sided surface, which may be the inside of a thing that stands on what is lit: do most
   /// of them, in one step?
   bool reaches_light(Tracer& tracer, std::uint32_t face, const Vec2& st, std::uint32_t key) const {
-    const bool inside = !open(in_.patches().part(face / 2), Patches::is_front(face));
+    const bool inside = !meant_to_be_seen(scene_, in_.patches().part(face / 2), Patches::is_front(face));
     const std::uint32_t steps = inside ? 1 : kSteps, wanted = inside ? kWalks / 2 + 1 : 1;
     std::uint32_t reached = 0;
     for (std::uint32_t walk = 0; reached < wanted && reached + kWalks - walk >= wanted; ++walk)
@@ -82,16 +82,10 @@ class LitSpace {
       const bool front = glm::dot(direction, at.ng) < 0;
       if (!is_black(in_.irradiance(hit.triangle, hit.u, hit.v, front))) return true;
       const std::uint32_t part = scene_.data().triangle_part[hit.triangle];
-      if (!open(part, front) || !scatters_diffusely(scene_, part, front)) return false;
+      if (!meant_to_be_seen(scene_, part, front) || !scatters_diffusely(scene_, part, front)) return false;
       normal = front ? at.ng : -at.ng;
     }
     return false;
-  }
-
-  /// Is the side of the part's surfaces one that light is meant for, not what is behind a single-sided surface?
-  bool open(std::uint32_t part, bool front) const {
-    const SceneData& data = scene_.data();
-    return front || data.materials[data.parts[part].material].double_sided;
   }
 
   const Scene& scene_;

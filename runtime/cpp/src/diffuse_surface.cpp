@@ -20,6 +20,11 @@ Hit middle_of(std::uint32_t triangle) { return {0, triangle, 1.0f / 3, 1.0f / 3}
 
 }  // namespace
 
+bool meant_to_be_seen(const Scene& scene, std::uint32_t part, bool front) {
+  const SceneData& data = scene.data();
+  return front || data.materials[data.parts[part].material].double_sided;
+}
+
 bool scatters_diffusely(const Scene& scene, std::uint32_t part, bool front) {
   const SceneData& data = scene.data();
   const Part& p = data.parts[part];

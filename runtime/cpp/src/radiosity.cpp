@@ -219,7 +219,7 @@ class Solver {
       open = std::move(next);
     }
     links_.set(std::move(kept));
-    shape_.measure_albedo(known);
+    shape_.measure_leaves(known);
     light_.pull();
   }
 
@@ -256,7 +256,7 @@ class Solver {
 
   void correct_sums() {
     correction_.clear();
-    const std::vector<Color> sums = links_.transport(context_.workers(), std::vector<Color>(shape_.elements.size(), Color(1)));
+    const std::vector<Color> sums = links_.transport(context_.workers(), shape_.uniform_shine());
     for (const Color& sum : sums)
       correction_.push_back(sum_correction(shape_, static_cast<std::uint32_t>(correction_.size()), sum.x));
   }

@@ -21,8 +21,8 @@ constexpr float kSmall = 1.0f / 16;
 
 std::vector<Color> Gatherer::at_leaves() const {
   const Shine shine(shape_, context_.workers(), light_.radiosity);
-  const std::vector<Color> one(shape_.elements.size(), Color(1));
-  const Shine even(shape_, context_.workers(), one);
+  const std::vector<Color> uniform = shape_.uniform_shine();
+  const Shine even(shape_, context_.workers(), uniform);
   std::vector<Gathered> from_clusters(links_.size());  // to the centers of the links' receivers, if they faced them
   context_.workers().parallel_for(links_.size(), 64, [&](std::size_t l) {
     if (is_cluster(links_[l].source))
@@ -87,6 +87,7 @@ Gatherer::Gathered Gatherer::unoccluded(std::uint32_t source, const Receiver& re
   g.sum = far ? facing * std::max(0.0f, -glm::dot(way, e.flat.normal)) * e.flat.area * kInvPi / sqr(sqr(distance))
               : point_form_factor(receiver.p, receiver.n, e.flat);
   g.E = g.sum * light_.radiosity[source];
+  g.sum *= e.outermost;
   return g;
 }
 

@@ -10,8 +10,11 @@
 namespace ln::radiosity {
 
 Hierarchy::Hierarchy(PrepareContext& context, NodeId node, const QuadTree& in, const RadiosityOptions& options)
-    : context_(context), patches_(in.patches()), smallest_area_(4 * sqr(options.smallest > 0 ? options.smallest : 1.0f / 128)) {
-  find_faces(node, in, options);
+    : context_(context),
+      node_(node),
+      patches_(in.patches()),
+      smallest_area_(4 * sqr(options.smallest > 0 ? options.smallest : 1.0f / 128)) {
+  find_faces(in, options);
   if (faces.empty()) return;
   std::vector<std::uint32_t> order(faces.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -22,32 +25,35 @@ Hierarchy::Hierarchy(PrepareContext& context, NodeId node, const QuadTree& in, c
   if (faces.size() > 1) build(order, 0, static_cast<std::uint32_t>(faces.size()), kNoNode);
   add_elements(in);
   sum_up_lobes();
-  measure_albedo(0);
+  measure_leaves(0);
 }
 
 /// Casts rays from each face, to learn which faces exchange light at all, and which see nothing but surfaces.
-void Hierarchy::find_faces(NodeId node, const QuadTree& in, const RadiosityOptions& options) {
-  constexpr std::uint32_t kFewest = 16, kMost = 8192;
+void Hierarchy::find_faces(const QuadTree& in, const RadiosityOptions& options) {
+  constexpr std::uint32_t kFewest = 16, kMost = 8192, kLooks = 16;
   constexpr float kAreaOfRay = 1e-4f;
   const Scene& scene = context_.scene();
   const auto count = static_cast<std::uint32_t>(patches_.face_count());
   std::vector<std::vector<std::uint32_t>> seen(count);  // faces
   enclosed_.assign(count, 0);
+  doubled_.assign(count, 0);
   context_.for_chunks(count, 16, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
-    tracer.enter(node);
+    tracer.enter(node_);
     for (auto face = static_cast<std::uint32_t>(begin); face < end; ++face) {
       const std::uint32_t patch = face / 2;
       const float size = ln::area(patches_.surface(patch));
       if (!(size > 0)) continue;
       const std::uint32_t rays = std::clamp(static_cast<std::uint32_t>(size / kAreaOfRay), kFewest, kMost);
-      const std::uint32_t key = hash32(face, node);
+      const std::uint32_t key = hash32(face, node_);
       enclosed_[face] = 1;
+      for (std::uint32_t i = 0; i < kLooks && !doubled_[face]; ++i)
+        doubled_[face] = !outermost(tracer, face, patches_.domain(patch).point(sobol_point(key, 2, i)), hash32(key, i));
       for (std::uint32_t i = 0; i < rays; ++i) {
         SurfacePosition at;
         scene.locate(patches_.hit(patch, patches_.domain(patch).point(sobol_point(key, 0, i))), at);
         const Frame frame = make_frame(Patches::is_front(face) ? at.ng : -at.ng);
         const Vec3 direction = frame.to_world(sample_cosine(sobol_point(key, 1, i)));
-        const Hit hit = tracer.intersect(spawn_ray(at, direction), hash32(key, i), node, RayKind::gather);
+        const Hit hit = tracer.intersect(spawn_ray(at, direction), hash32(key, i), node_, RayKind::gather);
         if (!hit.found()) {
           enclosed_[face] = 0;
           continue;
@@ -71,6 +77,23 @@ void Hierarchy::find_faces(NodeId node, const QuadTree& in, const RadiosityOptio
     if (lit[sets.find(face)] && ln::area(patches_.surface(face / 2)) > 0) add_face(face, options);
 }
 
+/// Does a ray from close above meet the face there, and not another surface in the same place? One that is not meant to be
+/// seen from there does not count: the bottom of a thing that stands on the face.
+bool Hierarchy::outermost(Tracer& tracer, std::uint32_t face, const Vec2& st, std::uint32_t key) const {
+  const Scene& scene = context_.scene();
+  SurfacePosition at;
+  scene.locate(patches_.hit(face / 2, st), at);
+  const Vec3 up = Patches::is_front(face) ? at.ng : -at.ng;
+  const float height = 2 * at.error;
+  const Hit hit = tracer.intersect({at.p + height * up, -up, 2 * height}, key, node_, RayKind::gather);
+  if (!hit.found()) return true;
+  const std::uint32_t other = patches_.locate(hit.triangle, hit.u, hit.v).patch;
+  if (other == face / 2) return true;
+  scene.locate(hit, at);
+  return meant_to_be_seen(scene, patches_.part(face / 2), Patches::is_front(face)) &&
+         !meant_to_be_seen(scene, patches_.part(other), glm::dot(at.ng, up) > 0);
+}
+
 void Hierarchy::add_face(std::uint32_t id, const RadiosityOptions& options) {
   const Scene& scene = context_.scene();
   const std::uint32_t part = patches_.part(id / 2);
@@ -80,6 +103,7 @@ void Hierarchy::add_face(std::uint32_t id, const RadiosityOptions& options) {
   face.scatters = diffuse && options.from(scene.part_tags(part));
   face.receives = face.scatters || (diffuse && options.to(scene.part_tags(part)));
   face.enclosed = enclosed_[id] != 0;
+  face.doubled = doubled_[id] != 0;
   face.albedo_varies = face.scatters && albedo_varies(scene, part);
   if (face.scatters && !face.albedo_varies)
     face.albedo = diffuse_albedo(scene, patches_.hit(id / 2, patches_.domain(id / 2).center()), Patches::is_front(id));
@@ -234,20 +258,41 @@ void Hierarchy::divide(std::uint32_t element) {
   }
 }
 
-void Hierarchy::measure_albedo(std::size_t first) {
+std::vector<Color> Hierarchy::uniform_shine() const {
+  std::vector<Color> shine;
+  shine.reserve(elements.size());
+  for (const Element& element : elements) shine.emplace_back(element.outermost);
+  return shine;
+}
+
+void Hierarchy::measure_leaves(std::size_t first) {
   constexpr std::uint32_t kSamples = 16;
   const Scene& scene = context_.scene();
-  context_.workers().parallel_for(elements.size() - first, 64, [&](std::size_t i) {
-    Element& element = elements[first + i];
-    const Face& face = faces[element.face];
-    element.albedo = face.albedo;
-    if (!face.albedo_varies || !element.leaf()) return;
-    Color sum(0);
-    for (std::uint32_t k = 0; k < kSamples; ++k)
-      sum += diffuse_albedo(scene, patches_.hit(face.id / 2, element.domain.point(sobol_point(1, 0, k))),
-                            Patches::is_front(face.id));
-    element.albedo = sum / static_cast<float>(kSamples);
+  context_.for_chunks(elements.size() - first, 64, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
+    tracer.enter(node_);
+    for (std::size_t i = first + begin; i < first + end; ++i) {
+      Element& element = elements[i];
+      const Face& face = faces[element.face];
+      element.albedo = face.albedo;
+      if (!element.leaf()) continue;
+      std::uint32_t own = 0;
+      Color sum(0);
+      for (std::uint32_t k = 0; k < kSamples; ++k) {
+        const Vec2 st = element.domain.point(sobol_point(1, 0, k));
+        if (face.doubled && outermost(tracer, face.id, st, hash32(static_cast<std::uint32_t>(i), k))) ++own;
+        if (face.albedo_varies) sum += diffuse_albedo(scene, patches_.hit(face.id / 2, st), Patches::is_front(face.id));
+      }
+      if (face.albedo_varies) element.albedo = sum / static_cast<float>(kSamples);
+      if (face.doubled) element.outermost = static_cast<float>(own) / static_cast<float>(kSamples);
+      element.albedo *= element.outermost;
+    }
   });
+  for (std::size_t i = elements.size(); i-- > 0;) {
+    Element& e = elements[i];
+    if (e.leaf() || !faces[e.face].doubled) continue;
+    e.outermost = 0;
+    for (std::uint32_t c = e.children; c < e.children + 4; ++c) e.outermost += 0.25f * elements[c].outermost;
+  }
 }
 
 Hierarchy::Place Hierarchy::place(NodeRef n, float pick, const Vec2& u) const {

@@ -29,6 +29,7 @@ struct Face {
   bool albedo_varies = false;
   bool enclosed = false;  // all that it sees are surfaces
   Color albedo{0};        // where it does not vary
+  bool doubled = false;   // another surface coincides with it, somewhere
 };
 
 /// A cell of a face. Elements stand behind their parents.
@@ -39,8 +40,9 @@ struct Element {
   std::uint32_t parent = kNoNode;
   std::uint32_t children = 0;  // the first of four; 0: a leaf
   int depth = 0;
-  Color source{0};  // irradiance that was there before [W/m^2]
-  Color albedo{0};  // of a leaf
+  Color source{0};      // irradiance that was there before [W/m^2]
+  Color albedo{0};      // of a leaf, times its outermost
+  float outermost = 1;  // share of it that rays meet; they miss the rest, for another surface coincides with it
 
   bool leaf() const { return children == 0; }
 };
@@ -109,8 +111,10 @@ class Hierarchy {
   }
   /// Cuts a leaf into four; the albedo of its children is to be measured.
   void divide(std::uint32_t element);
-  /// Albedos of leaves from `first` on.
-  void measure_albedo(std::size_t first);
+  /// What elements would shine if all surfaces had radiosity 1.
+  std::vector<Color> uniform_shine() const;
+  /// Albedos of leaves from `first` on, and how much of them is outermost.
+  void measure_leaves(std::size_t first);
 
   /// A point of an element.
   struct Place {
@@ -138,17 +142,19 @@ class Hierarchy {
   std::vector<Lobes> lobes;  // of large clusters, in their order
 
  private:
-  void find_faces(NodeId node, const QuadTree& in, const RadiosityOptions& options);
+  void find_faces(const QuadTree& in, const RadiosityOptions& options);
+  bool outermost(Tracer& tracer, std::uint32_t face, const Vec2& st, std::uint32_t key) const;
   void add_face(std::uint32_t id, const RadiosityOptions& options);
   NodeRef build(std::vector<std::uint32_t>& order, std::uint32_t begin, std::uint32_t end, NodeRef parent);
   void add_elements(const QuadTree& in);
   void sum_up_lobes();
 
   PrepareContext& context_;
+  NodeId node_;
   const Patches& patches_;
   float smallest_area_;
-  std::vector<std::uint8_t> enclosed_;  // by face of Patches
-  std::vector<double> area_before_;     // sum of the areas of the faces before
+  std::vector<std::uint8_t> enclosed_, doubled_;  // by face of Patches
+  std::vector<double> area_before_;               // sum of the areas of the faces before
 };
 
 }  // namespace ln::radiosity

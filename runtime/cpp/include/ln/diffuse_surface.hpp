@@ -5,6 +5,10 @@
 
 namespace ln {
 
+/// Is it the side of the part's surfaces that light is meant for, not what is behind a single-sided one, as the inside of a
+/// solid?
+bool meant_to_be_seen(const Scene& scene, std::uint32_t part, bool front);
+
 /// Can this side of a part scatter diffusely anywhere?
 bool scatters_diffusely(const Scene& scene, std::uint32_t part, bool front);
 

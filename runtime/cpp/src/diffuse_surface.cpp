@@ -55,4 +55,21 @@ Color diffuse_albedo(const Scene& scene, const Hit& hit, bool front) {
   return hit.triangle < data.alpha_begin ? albedo : albedo * coverage(data, hit.triangle, hit.u, hit.v);
 }
 
+bool outermost(Tracer& tracer, NodeId node, const Hit& at, bool front, std::uint32_t key) {
+  const Scene& scene = tracer.scene();
+  const std::vector<std::uint32_t>& part = scene.data().triangle_part;
+  SurfacePosition here;
+  scene.locate(at, here);
+  // By a ray at random, for rounding decides: exactly from above it may favour either surface at its own points.
+  constexpr float kDistance = 0x1p-14f;  // more than positions err by
+  const Vec3 up = front ? here.ng : -here.ng;
+  const Vec3 way = make_frame(up).to_world(sample_cosine(Vec2(to_unit_float(hash32(key, 0)), to_unit_float(hash32(key, 1)))));
+  const float distance = kDistance * (1 + to_unit_float(hash32(key, 2)));
+  const Hit hit = tracer.intersect({here.p + distance * way, -way, 2 * distance}, key, node, RayKind::gather);
+  if (!hit.found() || hit.triangle == at.triangle) return true;
+  scene.locate(hit, here);
+  return meant_to_be_seen(scene, part[at.triangle], front) &&
+         !meant_to_be_seen(scene, part[hit.triangle], glm::dot(here.ng, up) > 0);
+}
+
 }  // namespace ln

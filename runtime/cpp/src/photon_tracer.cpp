@@ -305,7 +305,7 @@ Photons trace_secondary_photons(PrepareContext& context, NodeId node, const Radi
                                 std::uint64_t count) {
   const std::vector<bool> live = live_states(via);
   if (count == 0 || !live[0]) return {};
-  const SecondarySources sources(context, source, stream_key(context, node, 0x70696c6fu), count / 16);
+  const SecondarySources sources(context, node, source, stream_key(context, node, 0x70696c6fu), count / 16);
   if (sources.empty()) return {};
   // Other random numbers than those of the particles' ways, for the source may use any of them.
   const std::uint32_t key = stream_key(context, node, 0x7365636fu);

@@ -47,7 +47,8 @@ void Hierarchy::find_faces(const QuadTree& in, const RadiosityOptions& options) 
       const std::uint32_t key = hash32(face, node_);
       enclosed_[face] = 1;
       for (std::uint32_t i = 0; i < kLooks && !doubled_[face]; ++i)
-        doubled_[face] = !outermost(tracer, face, patches_.domain(patch).point(sobol_point(key, 2, i)), hash32(key, i));
+        doubled_[face] = !outermost(tracer, node_, patches_.hit(patch, patches_.domain(patch).point(sobol_point(key, 2, i))),
+                                    Patches::is_front(face), hash32(key, i));
       for (std::uint32_t i = 0; i < rays; ++i) {
         SurfacePosition at;
         scene.locate(patches_.hit(patch, patches_.domain(patch).point(sobol_point(key, 0, i))), at);
@@ -75,23 +76,6 @@ void Hierarchy::find_faces(const QuadTree& in, const RadiosityOptions& options) 
     if (in.lit(face)) lit[sets.find(face)] = 1;
   for (std::uint32_t face = 0; face < count; ++face)
     if (lit[sets.find(face)] && ln::area(patches_.surface(face / 2)) > 0) add_face(face, options);
-}
-
-/// Does a ray from close above meet the face there, and not another surface in the same place? One that is not meant to be
-/// seen from there does not count: the bottom of a thing that stands on the face.
-bool Hierarchy::outermost(Tracer& tracer, std::uint32_t face, const Vec2& st, std::uint32_t key) const {
-  const Scene& scene = context_.scene();
-  SurfacePosition at;
-  scene.locate(patches_.hit(face / 2, st), at);
-  const Vec3 up = Patches::is_front(face) ? at.ng : -at.ng;
-  const float height = 2 * at.error;
-  const Hit hit = tracer.intersect({at.p + height * up, -up, 2 * height}, key, node_, RayKind::gather);
-  if (!hit.found()) return true;
-  const std::uint32_t other = patches_.locate(hit.triangle, hit.u, hit.v).patch;
-  if (other == face / 2) return true;
-  scene.locate(hit, at);
-  return meant_to_be_seen(scene, patches_.part(face / 2), Patches::is_front(face)) &&
-         !meant_to_be_seen(scene, patches_.part(other), glm::dot(at.ng, up) > 0);
 }
 
 void Hierarchy::add_face(std::uint32_t id, const RadiosityOptions& options) {
@@ -279,8 +263,10 @@ void Hierarchy::measure_leaves(std::size_t first) {
       Color sum(0);
       for (std::uint32_t k = 0; k < kSamples; ++k) {
         const Vec2 st = element.domain.point(sobol_point(1, 0, k));
-        if (face.doubled && outermost(tracer, face.id, st, hash32(static_cast<std::uint32_t>(i), k))) ++own;
-        if (face.albedo_varies) sum += diffuse_albedo(scene, patches_.hit(face.id / 2, st), Patches::is_front(face.id));
+        const Hit at = patches_.hit(face.id / 2, st);
+        if (face.doubled && outermost(tracer, node_, at, Patches::is_front(face.id), hash32(static_cast<std::uint32_t>(i), k)))
+          ++own;
+        if (face.albedo_varies) sum += diffuse_albedo(scene, at, Patches::is_front(face.id));
       }
       if (face.albedo_varies) element.albedo = sum / static_cast<float>(kSamples);
       if (face.doubled) element.outermost = static_cast<float>(own) / static_cast<float>(kSamples);

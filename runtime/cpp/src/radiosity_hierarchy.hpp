@@ -143,7 +143,6 @@ class Hierarchy {
 
  private:
   void find_faces(const QuadTree& in, const RadiosityOptions& options);
-  bool outermost(Tracer& tracer, std::uint32_t face, const Vec2& st, std::uint32_t key) const;
   void add_face(std::uint32_t id, const RadiosityOptions& options);
   NodeRef build(std::vector<std::uint32_t>& order, std::uint32_t begin, std::uint32_t end, NodeRef parent);
   void add_elements(const QuadTree& in);

@@ -17,21 +17,24 @@ constexpr double kSafeShare = 0.2;
 
 }  // namespace
 
-SecondarySources::SecondarySources(PrepareContext& context, const RadianceSource& source, std::uint32_t key,
+SecondarySources::SecondarySources(PrepareContext& context, NodeId node, const RadianceSource& source, std::uint32_t key,
                                    std::uint64_t pilots)
-    : source_(&source), patches_(context.scene().data()) {
+    : node_(node), source_(&source), patches_(context.scene().data()), doubled_(patches_.face_count(), 0) {
   add_cells(context.scene(), std::clamp<std::uint64_t>(pilots / kPilotsPerCell, 64, 1 << 16));
 
   std::vector<double> powers(cells_.size());
+  std::vector<std::uint8_t> doubled(cells_.size(), 0);
   context.for_chunks(cells_.size(), 64, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
     for (std::size_t i = begin; i < end; ++i)
       for (std::uint32_t k = 0; k < kPilotsPerCell; ++k) {
         const SampleStream random(key, static_cast<std::uint32_t>(i * kPilotsPerCell + k));
+        if (hidden(cells_[i], tracer, random)) doubled[i] = 1;
         powers[i] += static_cast<double>(max_component(emit_from(cells_[i], tracer, random).flux)) / kPilotsPerCell;
       }
   });
   double power = 0, area = 0;
   for (std::size_t i = 0; i < cells_.size(); ++i) {
+    doubled_[cells_[i].face] |= doubled[i];
     power += powers[i];
     area += static_cast<double>(cells_[i].area);
   }
@@ -64,6 +67,11 @@ void SecondarySources::add_cells(const Scene& scene, std::uint64_t wanted) {
   }
 }
 
+bool SecondarySources::hidden(const Cell& cell, Tracer& tracer, const SampleStream& random) const {
+  const Hit at = patches_.hit(cell.face / 2, cell.domain.point(random.get2(kOwn)));
+  return !outermost(tracer, node_, at, Patches::is_front(cell.face), random.bits(kCoverage));
+}
+
 PhotonEmission SecondarySources::emit_from(const Cell& cell, Tracer& tracer, const SampleStream& random) const {
   const Scene& scene = tracer.scene();
   const Hit hit = patches_.hit(cell.face / 2, cell.domain.point(random.get2(kOwn)));
@@ -88,7 +96,9 @@ PhotonEmission SecondarySources::emit_from(const Cell& cell, Tracer& tracer, con
 PhotonEmission SecondarySources::emit(Tracer& tracer, const SampleStream& random) const {
   const Distribution::Sample pick = power_.sample(random.get1(kBsdfLobe));
   if (!(pick.pmf > 0)) return {};
-  PhotonEmission photon = emit_from(cells_[pick.index], tracer, random);
+  const Cell& cell = cells_[pick.index];
+  if (doubled_[cell.face] != 0 && hidden(cell, tracer, random)) return {};
+  PhotonEmission photon = emit_from(cell, tracer, random);
   photon.flux /= pick.pmf;
   return photon;
 }

@@ -266,6 +266,17 @@ TEST_CASE("secondary sources send out what they say, wherever they are bright") 
   CHECK(power(path_automaton<EmptyPath>(), uneven) == doctest::Approx(pi * (strip + rest)).epsilon(0.01));
 }
 
+TEST_CASE("secondary sources that coincide count once") {
+  SceneBuilder b;
+  const std::uint32_t m = b.material(Color(0.5f));
+  b.box(Vec3(-0.5f), Vec3(0.5f), m, true, 1);
+  b.box(Vec3(-0.5f), Vec3(0.5f), m, true, 3);
+  Stage stage(b.data);
+  const auto source = [](Tracer&, const SampleStream&, const Interaction& at) { return Color(at.front ? 1.0f : 0.0f); };
+  const Photons photons = trace_secondary_photons(stage.context, 2, source, path_automaton<EmptyPath>(), 100'000);
+  CHECK(photons.ledger.emitted.x == doctest::Approx(6 * static_cast<double>(kPi)).epsilon(0.02));
+}
+
 TEST_CASE("secondary sources: a mirror's share of the light is not scattered diffusely; any number of threads, same photons") {
   std::vector<std::vector<Photon>> hits;
   for (const int threads : {1, 2, 5}) {

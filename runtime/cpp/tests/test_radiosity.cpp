@@ -146,6 +146,19 @@ TEST_CASE("slow: the same of many surfaces, and with small errors" * doctest::sk
   for (int shape = 0; shape < kSpaces; ++shape) check_even_space(shape, 12, 16, 0.01f);
 }
 
+TEST_CASE("walls that coincide count once; what is seen of them is lit as if there were one") {
+  SceneBuilder b;
+  const std::uint32_t m = b.material(Color(0.5f));
+  const Vec3 low(-0.5f, -0.4f, -0.3f), high(0.5f, 0.4f, 0.3f);
+  b.box(low, high, m, true, 1);
+  b.box(low, high, m, true, 3);
+  Stage stage(b.data);
+  const Range found = irradiance(solve_radiosity(stage.context, 1, light_on(stage, everywhere), {}), everywhere);
+  CHECK(found.mean == doctest::Approx(1).epsilon(0.005));
+  CHECK(found.low > 0.97);
+  CHECK(found.high < 1.03);
+}
+
 TEST_CASE("energy is kept: what arrives is what leaves, from a single lit spot in a closed room with obstacles") {
   check_energy(0.03f);
 }

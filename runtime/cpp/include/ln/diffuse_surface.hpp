@@ -2,6 +2,7 @@
 // What radiosity sees of a surface: how much of the irradiance its diffuse lobe returns.
 
 #include "ln/scene.hpp"
+#include "ln/tracer.hpp"
 
 namespace ln {
 
@@ -17,5 +18,9 @@ bool albedo_varies(const Scene& scene, std::uint32_t part);
 
 /// Radiant exitance over irradiance of the diffuse lobe at a point, averaged over directions of view, times the coverage there.
 Color diffuse_albedo(const Scene& scene, const Hit& hit, bool front);
+
+/// Of surfaces that coincide rays meet only one: does one from close above meet the triangle of `at` there? A surface that is
+/// not meant to be seen from that side does not count, such as the bottom of a thing that stands on this one.
+bool outermost(Tracer& tracer, NodeId node, const Hit& at, bool front, std::uint32_t key);
 
 }  // namespace ln

@@ -12,7 +12,7 @@ namespace ln {
 class SecondarySources {
  public:
   /// Cuts the surfaces into cells and asks `source`, some `pilots` times, how bright each is.
-  SecondarySources(PrepareContext& context, const RadianceSource& source, std::uint32_t key, std::uint64_t pilots);
+  SecondarySources(PrepareContext& context, NodeId node, const RadianceSource& source, std::uint32_t key, std::uint64_t pilots);
 
   bool empty() const { return power_.empty(); }
 
@@ -28,12 +28,16 @@ class SecondarySources {
   };
 
   void add_cells(const Scene& scene, std::uint64_t wanted);
+  /// Does another surface coincide with the cell where `emit_from` starts?
+  bool hidden(const Cell& cell, Tracer& tracer, const SampleStream& random) const;
   /// A particle from one cell; its flux is that of the whole cell.
   PhotonEmission emit_from(const Cell& cell, Tracer& tracer, const SampleStream& random) const;
 
+  NodeId node_;
   const RadianceSource* source_;
   Patches patches_;
   std::vector<Cell> cells_;
+  std::vector<std::uint8_t> doubled_;  // by face: does another surface coincide with it, somewhere?
   Distribution power_;
 };
 

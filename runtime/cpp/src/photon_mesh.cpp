@@ -29,6 +29,9 @@ constexpr float kWallSpacing = 1.0f / 32;
 /// Vertices below a wall are seen from points that are so far to its sides [radii; ways to the middle of a triangle, at most].
 constexpr float kWallOffset = 0.02f, kWallMaxOffset = 0.25f;
 
+/// Irradiances that differ by more [standard errors] are of different light.
+constexpr float kDifferent = 4;
+
 /// So much memory a triangle takes while the mesh is made, its share of vertices and edges included.
 constexpr double kTriangleBytes = 256;
 
@@ -225,15 +228,17 @@ class MeshBuilder {
   }
 
   /// Is an edge longer than the wider kernel at its ends allows, or a wall across it? Both sides of it agree, so there are no
-  /// cracks. The wider one: a kernel that is narrow by chance is alone, and calls for no finer mesh.
+  /// cracks. The wider one: a kernel that is narrow by chance is alone, and calls for no finer mesh. Where the light differs,
+  /// the narrower one, which tells on which side of the difference its end is.
   bool too_long(std::uint32_t a, std::uint32_t b, Tracer& tracer) const {
     if (a > b) std::swap(a, b);
     const MeshVertex& p = vertices_[a];
     const MeshVertex& q = vertices_[b];
-    const float length = glm::distance(p.around.point, q.around.point), radius = std::max(p.radii.mean(), q.radii.mean());
-    if (length > options_.spacing * radius) return true;
-    if (!(length > kWallSpacing * options_.spacing * radius)) return false;
-    return wall_between(p.around.point, q.around.point, p.around.normal, q.around.normal, kWallHeight * radius, tracer);
+    const float noise = std::hypot(p.radii.sigma, q.radii.sigma), length = glm::distance(p.around.point, q.around.point);
+    const auto [narrower, wider] = std::minmax({p.radii.mean(), q.radii.mean()});
+    if (length > options_.spacing * (std::abs(p.radii.E - q.radii.E) > kDifferent * noise ? narrower : wider)) return true;
+    if (!(length > kWallSpacing * options_.spacing * wider)) return false;
+    return wall_between(p.around.point, q.around.point, p.around.normal, q.around.normal, kWallHeight * wider, tracer);
   }
 
   /// Does a wall stand between two points of a surface with these normals? What goes on from the first is none.

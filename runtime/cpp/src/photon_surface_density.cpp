@@ -33,8 +33,9 @@ SurfaceDensity::SurfaceDensity(PrepareContext& context, const SurfaceArea& area,
 // Each half's kernel is as wide as the other half says, so that photons do not choose their own weight.
 KernelRadii SurfaceDensity::radii(const Neighbourhood& around) const {
   if (even()) return {{kInfinity, kInfinity}};
-  const auto radius = [&](int half) { return adaptive_local_linear(half_[half], *area_, around, kernels_, sheet_).radius; };
-  return {{radius(1), radius(0)}};
+  const auto chosen = [&](int half) { return adaptive_local_linear(half_[half], *area_, around, kernels_, sheet_); };
+  const LocalEstimate by[2] = {chosen(0), chosen(1)};
+  return {{by[1].radius, by[0].radius}, mean_component(by[0].E + by[1].E), std::hypot(by[0].sigma, by[1].sigma)};
 }
 
 Color SurfaceDensity::irradiance(const Neighbourhood& around, const KernelRadii& radii) const {

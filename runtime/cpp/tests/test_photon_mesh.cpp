@@ -186,6 +186,27 @@ TEST_CASE("a dark strip between bright ones stays dark") {
   CHECK(mean_within(0.7f) == doctest::Approx(kWhole / 0.7).epsilon(0.02));
 }
 
+TEST_CASE("the mesh is fine where the light changes, however wide the kernels beside it are") {
+  SceneBuilder b;
+  add_floor(b);
+  Stage stage(b.data);
+  // Irradiance 0.1 where x < 0.02, and 1 elsewhere.
+  constexpr float kDark = 0.1f, kEdge = 0.02f, kLeft = kDark * (0.7f + kEdge), kWhole = kLeft + 0.7f - kEdge;
+  const Photons photons = floor_photons(stage.scene, kWhole / 1.4f, 300'000, [=](float u) {
+    const float flux = u * kWhole;  // left of the photon
+    return flux < kLeft ? flux / kDark - 0.7f : kEdge + flux - kLeft;
+  });
+  const TriMesh mesh = photon_mesh(stage.context, sort_by_surface(stage.scene.data(), photons.hits), {});
+  const auto mean_at = [&](float x) {
+    return mean_over_square([&](Vec2 u) {
+      const Hit hit = stage.scene.accel().intersect({{x, 0.5f, 1.2f * u.y - 0.6f}, {0, -1, 0}}, 0);
+      return static_cast<double>(mesh.irradiance(hit.triangle, hit.u, hit.v, true).x);
+    });
+  };
+  CHECK(mean_at(kEdge - 0.02f) < 1.3 * static_cast<double>(kDark));
+  CHECK(mean_at(kEdge + 0.02f) > 0.9);
+}
+
 TEST_CASE("a plane under a directional light is evenly lit up to its border, in one piece or many") {
   for (const int pieces : {1, 7}) {
     SceneBuilder b;

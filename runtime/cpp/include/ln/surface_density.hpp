@@ -6,9 +6,10 @@
 
 namespace ln {
 
-/// Radii of the kernels at a point, for the two halves of the photons.
+/// Radii of the kernels at a point, for the two halves of the photons, and what the search for them found.
 struct KernelRadii {
   float half[2] = {0, 0};
+  float E = 0, sigma = kInfinity;  // irradiance, mean of the channels, and its standard error [W/m^2]; infinite: unknown
 
   float mean() const { return 0.5f * (half[0] + half[1]); }
 };

@@ -1,5 +1,7 @@
 #include "ln/diffuse_surface.hpp"
 
+#include <algorithm>
+
 #include "ln/material.hpp"
 
 namespace ln {
@@ -14,6 +16,14 @@ auto with_bsdf(const Scene& scene, const Hit& hit, bool front, Use&& use) {
   const Vec3 outwards = front ? at.ng : -at.ng;
   const Interaction interaction(scene, Ray{at.p + outwards, -outwards, kInfinity}, hit);
   return use(interaction.bsdf());
+}
+
+/// At least so far is a point of a triangle from the triangle's edges.
+float distance_to_edge(const SceneData& data, const Hit& at) {
+  const UVec3 i = data.triangles[at.triangle];
+  const Vec3 &a = data.positions[i.x], &b = data.positions[i.y], &c = data.positions[i.z];
+  const float longest = std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
+  return std::min({at.u, at.v, 1 - at.u - at.v}) * glm::length(glm::cross(b - a, c - a)) / longest;
 }
 
 Hit middle_of(std::uint32_t triangle) { return {0, triangle, 1.0f / 3, 1.0f / 3}; }
@@ -64,9 +74,12 @@ bool outermost(Tracer& tracer, NodeId node, const Hit& at, bool front, std::uint
   constexpr float kDistance = 0x1p-14f;  // more than positions err by
   const Vec3 up = front ? here.ng : -here.ng;
   const Vec3 way = make_frame(up).to_world(sample_cosine(Vec2(to_unit_float(hash32(key, 0)), to_unit_float(hash32(key, 1)))));
-  const float distance = kDistance * (1 + to_unit_float(hash32(key, 2)));
+  const float distance = kDistance * (1 + to_unit_float(hash32(key, 2))), slope = glm::dot(way, up);
   const Hit hit = tracer.intersect({here.p + distance * way, -way, 2 * distance}, key, node, RayKind::gather);
   if (!hit.found() || hit.triangle == at.triangle) return true;
+  // What meets the triangle at its edge only runs by.
+  const float close = 2 * here.error;
+  if (std::abs(distance - hit.t) * slope > close || distance_to_edge(scene.data(), at) * slope < close) return true;
   scene.locate(hit, here);
   return meant_to_be_seen(scene, part[at.triangle], front) &&
          !meant_to_be_seen(scene, part[hit.triangle], glm::dot(here.ng, up) > 0);

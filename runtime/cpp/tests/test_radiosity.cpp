@@ -1,6 +1,7 @@
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <doctest/doctest.h>
 
+#include "ln/diffuse_surface.hpp"
 #include "ln/form_factor.hpp"
 #include "ln/radiosity.hpp"
 #include "photon_scenes.hpp"
@@ -144,6 +145,37 @@ TEST_CASE("in a closed space that is lit evenly: rho / (1 - rho), in corners and
 
 TEST_CASE("slow: the same of many surfaces, and with small errors" * doctest::skip()) {
   for (int shape = 0; shape < kSpaces; ++shape) check_even_space(shape, 12, 16, 0.01f);
+}
+
+TEST_CASE("of surfaces that coincide, rays meet one at each point; what meets a surface at an edge, or stands on it, is none") {
+  SceneBuilder b;
+  const std::uint32_t m = b.material(Color(0.5f));
+  b.quad({-0.5f, 0, 0.5f}, {0.5f, 0, 0.5f}, {0.5f, 0, -0.5f}, {-0.5f, 0, -0.5f}, m, 1);
+  b.quad({-0.5f, 0, 0.5f}, {0.5f, 0, 0.5f}, {0.5f, 0, -0.5f}, {-0.5f, 0, -0.5f}, m, 3);
+  const auto doubled = static_cast<std::uint32_t>(b.data.triangles.size());
+  b.quad({-0.5f, 0.5f, 0.5f}, {0.5f, 0.5f, 0.5f}, {0.5f, 0.5f, -0.5f}, {-0.5f, 0.5f, -0.5f}, m);
+  b.box(Vec3(-0.2f, 0.5f, -0.2f), Vec3(0.2f, 0.6f, 0.2f), m, false);
+  b.sphere(Vec3(0.8f), 0.02f, m, true, 100);  // triangles of half a thousandth
+  Stage stage(b.data);
+  const Patches patches(stage.scene.data());
+  double share = 0;
+  std::size_t hidden = 0;
+  stage.context.for_chunks(1, 1, [&](std::size_t, std::size_t, Tracer& tracer) {
+    for (std::uint32_t p = 0; p < patches.size(); ++p) {
+      const std::uint32_t points = p < 10 ? 2000 : 16;
+      for (std::uint32_t i = 0; i < points; ++i) {
+        const Hit at = patches.hit(p, patches.domain(p).point(sobol_point(p, 0, i)));
+        const bool found = outermost(tracer, 1, at, true, hash32(p, i));
+        if (at.triangle < doubled) {
+          share += found ? static_cast<double>(area(patches.surface(p)) / static_cast<float>(points)) : 0;
+        } else if (!found) {
+          ++hidden;
+        }
+      }
+    }
+  });
+  CHECK(share == doctest::Approx(1).epsilon(0.02));
+  CHECK(hidden == 0);
 }
 
 TEST_CASE("walls that coincide count once; what is seen of them is lit as if there were one") {

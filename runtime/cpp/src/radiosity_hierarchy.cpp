@@ -30,7 +30,7 @@ Hierarchy::Hierarchy(PrepareContext& context, NodeId node, const QuadTree& in, c
 
 /// Casts rays from each face, to learn which faces exchange light at all, and which see nothing but surfaces.
 void Hierarchy::find_faces(const QuadTree& in, const RadiosityOptions& options) {
-  constexpr std::uint32_t kFewest = 16, kMost = 8192, kLooks = 16;
+  constexpr std::uint32_t kFewest = 16, kMost = 8192, kMostLooks = 16;
   constexpr float kAreaOfRay = 1e-4f;
   const Scene& scene = context_.scene();
   const auto count = static_cast<std::uint32_t>(patches_.face_count());
@@ -46,7 +46,7 @@ void Hierarchy::find_faces(const QuadTree& in, const RadiosityOptions& options) 
       const std::uint32_t rays = std::clamp(static_cast<std::uint32_t>(size / kAreaOfRay), kFewest, kMost);
       const std::uint32_t key = hash32(face, node_);
       enclosed_[face] = 1;
-      for (std::uint32_t i = 0; i < kLooks && !doubled_[face]; ++i)
+      for (std::uint32_t i = 0; i < std::min(rays / 4, kMostLooks) && !doubled_[face]; ++i)
         doubled_[face] = !outermost(tracer, node_, patches_.hit(patch, patches_.domain(patch).point(sobol_point(key, 2, i))),
                                     Patches::is_front(face), hash32(key, i));
       for (std::uint32_t i = 0; i < rays; ++i) {

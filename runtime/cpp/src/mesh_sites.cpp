@@ -21,6 +21,11 @@ constexpr float kLeastWeight = 1e-3f;
 /// Variance of what is filled in, at most [that of a site's estimate].
 constexpr float kMaxNoise = 2;
 
+/// A kernel is narrow beside one of which it has less than this share of the radius; an irradiance is known much better with
+/// less than this share of the standard error, and agrees if it is so many of them away, at most. At a border, errors are
+/// larger with the same radius: there, the curve of the light would become a bias.
+constexpr float kNarrow = 0.9f, kMuchBetter = 0.7f, kAgreement = 3;
+
 /// A vertex within the reach of a site.
 struct Reached {
   std::uint32_t vertex, site;
@@ -88,6 +93,25 @@ KernelRadii median_radii(std::span<const MeshVertex> vertices, std::span<const s
     median.half[half] = *middle;
   }
   return median;
+}
+
+Color steadied(std::uint32_t v, std::span<const MeshVertex> vertices, std::span<const SurfaceIrradiance> irradiances,
+               std::span<const std::uint32_t> neighbours) {
+  const SurfaceIrradiance& own = irradiances[v];
+  Color sum = own.E;
+  float weights = 1;
+  for (const std::uint32_t w : neighbours) {
+    const SurfaceIrradiance& other = irradiances[w];
+    const Vec3 way = vertices[v].around.point - vertices[w].around.point;
+    if (!(own.radius < kNarrow * other.radius && other.sigma > 0 && other.sigma < kMuchBetter * own.sigma)) continue;
+    if (glm::length(way) > other.radius) continue;
+    const float there = mean_component(other.E), here = there + glm::dot(other.gradient, way);
+    if (!(there > 0 && here > 0 && std::abs(here - mean_component(own.E)) < kAgreement * own.sigma)) continue;
+    const float weight = sqr(own.sigma / other.sigma);
+    sum += weight * here / there * other.E;
+    weights += weight;
+  }
+  return sum / weights;
 }
 
 MeshSites::MeshSites(PrepareContext& context, std::span<MeshVertex> vertices,

@@ -19,6 +19,11 @@ struct MeshVertex {
 /// The median of each of the radii.
 KernelRadii median_radii(std::span<const MeshVertex> vertices, std::span<const std::uint32_t> of);
 
+/// The irradiance at vertex `v`, averaged with what those neighbours say of it that are known much better and agree with it
+/// within noise, by inverse variances: a kernel that is narrow by chance makes no speck.
+Color steadied(std::uint32_t v, std::span<const MeshVertex> vertices, std::span<const SurfaceIrradiance> irradiances,
+               std::span<const std::uint32_t> neighbours);
+
 /// Of the first vertices of a mesh: those that are estimated, and which of them reach the others.
 class MeshSites {
  public:

@@ -28,6 +28,30 @@ float standard_errors(const LocalEstimate& wider, const LocalEstimate& narrower)
 
 bool nearer(const NearPhoton& a, const NearPhoton& b) { return a.distance2 < b.distance2; }
 
+/// Mean and covariance of places under a kernel.
+struct Covariance {
+  explicit Covariance(const SurfaceMoments& m)
+      : x(m.x / m.one),
+        y(m.y / m.one),
+        xx(m.xx / m.one - x * x),
+        xy(m.xy / m.one - x * y),
+        yy(m.yy / m.one - y * y),
+        determinant(xx * yy - xy * xy) {}
+
+  /// May a slope be told?
+  bool is_wide() const { return determinant > kMinDeterminant; }
+
+  float x, y, xx, xy, yy, determinant;
+};
+
+/// Of the linear function whose integrals under the kernel, times 1, x and y, are `sums`; 0 where the surface is too thin.
+Vec2 linear_slope(const SurfaceMoments& m, const Vec3& sums) {
+  const Covariance c(m);
+  if (!c.is_wide()) return Vec2(0);
+  const float x = sums.y - c.x * sums.x, y = sums.z - c.y * sums.x;
+  return Vec2(c.yy * x - c.xy * y, c.xx * y - c.xy * x) / (c.determinant * m.one);
+}
+
 /// Photons near a point, as sums over them want them.
 class LocalPhotons {
  public:
@@ -58,34 +82,72 @@ class LocalPhotons {
 
   /// The estimate from the photons within `radius`, which are among the first `count`, or among all.
   LocalEstimate estimate(std::size_t count, float radius, const SurfaceArea& area, std::uint32_t label) const {
-    SurfaceCoverage coverage;
-    area.measure(around_, std::max(radius, kMinRadius), PhotonKernel::parabola, coverage, label);
-    if (!(coverage.area > 0)) return {.radius = radius};
-    const Vec3 weights = linear_weights(coverage.moments);
-    const float scale = 1 / coverage.radius, inverse_area = sqr(scale);
-    Lanes red{}, green{}, blue{}, variance{};
-    for (std::size_t i = 0; i < std::min((count + kLanes - 1) / kLanes, blocks_.size()); ++i) {
-      const Block& block = blocks_[i];
-      const Lanes x = block.x * scale, y = block.y * scale, kernel = 1 - block.distance2 * inverse_area;
-      const Lanes weight = kernel * (weights.x + (weights.y * x + weights.z * y) * block.stretch);
-      LaneMask counts = kernel > 0;
-      if (coverage.blockers > 0) counts &= ~coverage.hides(x, y);
-      const Lanes used = counts ? weight : Lanes{};
-      red += used * block.red;
-      green += used * block.green;
-      blue += used * block.blue;
-      const Lanes term = used * (block.red + block.green + block.blue) * (1.0f / 3);
-      variance += term * term;
-    }
-    const Color E = Color(sum(red), sum(green), sum(blue)) * inverse_area;
-    return {glm::max(E, Color(0)), std::sqrt(sum(variance)) * inverse_area, radius, coverage.area};
+    return estimate(count, radius, measure(radius, area, label));
+  }
+
+  /// The estimate from all photons within `radius`.
+  LinearEstimate linear_estimate(float radius, const SurfaceArea& area, std::uint32_t label) const {
+    const SurfaceCoverage coverage = measure(radius, area, label);
+    return {estimate(kLanes * blocks_.size(), radius, coverage), gradient(coverage)};
   }
 
  private:
   /// (x, y): place in the tangent plane; times `stretch`, it is as far from the point as the photon is.
   struct Block {
     Lanes distance2 = Lanes{} + kInfinity, x{}, y{}, stretch{}, red{}, green{}, blue{};
+
+    Lanes mean() const { return (red + green + blue) * (1.0f / 3); }
   };
+
+  SurfaceCoverage measure(float radius, const SurfaceArea& area, std::uint32_t label) const {
+    SurfaceCoverage coverage;
+    area.measure(around_, std::max(radius, kMinRadius), PhotonKernel::parabola, coverage, label);
+    return coverage;
+  }
+
+  /// The kernel at a block's photons, whose places are (x, y) [radii]: 0 where it does not reach.
+  static Lanes kernel_at(const Block& block, const Lanes& x, const Lanes& y, const SurfaceCoverage& coverage) {
+    const float scale = 1 / coverage.radius;
+    const Lanes kernel = 1 - block.distance2 * sqr(scale);
+    LaneMask counts = kernel > 0;
+    if (coverage.blockers > 0) counts &= ~coverage.hides(x, y);
+    return counts ? kernel : Lanes{};
+  }
+
+  LocalEstimate estimate(std::size_t count, float radius, const SurfaceCoverage& coverage) const {
+    if (!(coverage.area > 0)) return {.radius = radius};
+    const Vec3 weights = linear_weights(coverage.moments);
+    const float scale = 1 / coverage.radius, inverse_area = sqr(scale);
+    Lanes red{}, green{}, blue{}, variance{};
+    for (std::size_t i = 0; i < std::min((count + kLanes - 1) / kLanes, blocks_.size()); ++i) {
+      const Block& block = blocks_[i];
+      const Lanes x = block.x * scale, y = block.y * scale;
+      const Lanes weight = kernel_at(block, x, y, coverage) * (weights.x + (weights.y * x + weights.z * y) * block.stretch);
+      red += weight * block.red;
+      green += weight * block.green;
+      blue += weight * block.blue;
+      const Lanes term = weight * block.mean();
+      variance += term * term;
+    }
+    const Color E = Color(sum(red), sum(green), sum(blue)) * inverse_area;
+    return {glm::max(E, Color(0)), std::sqrt(sum(variance)) * inverse_area, radius, coverage.area};
+  }
+
+  /// Of the linear function that the estimate is the value of.
+  Vec3 gradient(const SurfaceCoverage& coverage) const {
+    if (!(coverage.area > 0)) return Vec3(0);
+    const float scale = 1 / coverage.radius;
+    Lanes one{}, along_x{}, along_y{};
+    for (const Block& block : blocks_) {
+      const Lanes x = block.x * scale, y = block.y * scale;
+      const Lanes term = kernel_at(block, x, y, coverage) * block.mean();
+      one += term;
+      along_x += term * x * block.stretch;
+      along_y += term * y * block.stretch;
+    }
+    const Vec2 slope = linear_slope(coverage.moments, {sum(one), sum(along_x), sum(along_y)});
+    return (slope.x * frame_.s + slope.y * frame_.t) * (scale * sqr(scale));
+  }
 
   const PhotonMap& map_;
   const Neighbourhood& around_;
@@ -96,19 +158,17 @@ class LocalPhotons {
 }  // namespace
 
 Vec3 linear_weights(const SurfaceMoments& m) {
-  const float x = m.x / m.one, y = m.y / m.one;
-  const float xx = m.xx / m.one - x * x, xy = m.xy / m.one - x * y, yy = m.yy / m.one - y * y;
-  const float determinant = xx * yy - xy * xy;
-  if (!(determinant > kMinDeterminant)) return {1 / m.one, 0, 0};
-  const float c1 = (xy * y - yy * x) / determinant, c2 = (xy * x - xx * y) / determinant;
-  return Vec3(1 - c1 * x - c2 * y, c1, c2) / m.one;
+  const Covariance c(m);
+  if (!c.is_wide()) return {1 / m.one, 0, 0};
+  const float c1 = (c.xy * c.y - c.yy * c.x) / c.determinant, c2 = (c.xy * c.x - c.xx * c.y) / c.determinant;
+  return Vec3(1 - c1 * c.x - c2 * c.y, c1, c2) / m.one;
 }
 
-LocalEstimate local_linear(const PhotonMap& map, std::span<const NearPhoton> photons, const SurfaceArea& area,
-                           const Neighbourhood& around, float radius, std::uint32_t label) {
+LinearEstimate local_linear(const PhotonMap& map, std::span<const NearPhoton> photons, const SurfaceArea& area,
+                            const Neighbourhood& around, float radius, std::uint32_t label) {
   LocalPhotons local(map, around);
   local.assign(photons);
-  return local.estimate(photons.size(), radius, area, label);
+  return local.linear_estimate(radius, area, label);
 }
 
 LocalEstimate adaptive_local_linear(const PhotonMap& map, const SurfaceArea& area, const Neighbourhood& around,

@@ -108,8 +108,9 @@ class MeshBuilder {
       pieces.swap(next);
     }
     part_at_walls();
-    pool_radii();
-    return estimate();
+    const std::vector<std::vector<std::uint32_t>> around = neighbours();
+    pool_radii(around);
+    return estimate(around);
   }
 
  private:
@@ -442,9 +443,8 @@ class MeshBuilder {
       if (has_sides[v]) sites_.set_site(v);
   }
 
-  /// Gives each vertex the median of its radii and its neighbours': kernels that are narrow by chance are few and apart, those
-  /// along an edge of the light have each other. Neighbours are ends of the same edge, and sites within reach.
-  void pool_radii() {
+  /// Of each vertex, itself included: sites at the ends of its edges, and those that reach it.
+  std::vector<std::vector<std::uint32_t>> neighbours() const {
     std::vector<std::vector<std::uint32_t>> around(vertices_.size());
     const auto add = [&](std::uint32_t v, std::uint32_t w) {
       if (sites_.is_site(w)) around[v].push_back(w);
@@ -455,26 +455,35 @@ class MeshBuilder {
     }
     for (const Piece& piece : done_)
       for (std::size_t k = 0; k < 3; ++k) add(piece.triangle.vertex[k], piece.triangle.vertex[(k + 1) % 3]);
-    std::vector<KernelRadii> pooled(vertices_.size());
-    context_.for_chunks(vertices_.size(), 1024, [&](std::size_t begin, std::size_t end, Tracer&) {
-      for (std::size_t v = begin; v < end; ++v) {
-        std::sort(around[v].begin(), around[v].end());
-        around[v].erase(std::unique(around[v].begin(), around[v].end()), around[v].end());
-        pooled[v] = median_radii(vertices_, around[v]);
-      }
+    context_.workers().parallel_for(around.size(), 1024, [&](std::size_t v) {
+      std::sort(around[v].begin(), around[v].end());
+      around[v].erase(std::unique(around[v].begin(), around[v].end()), around[v].end());
     });
+    return around;
+  }
+
+  /// Gives each vertex the median of its radii and its neighbours': kernels that are narrow by chance are few and apart, those
+  /// along an edge of the light have each other.
+  void pool_radii(const std::vector<std::vector<std::uint32_t>>& around) {
+    std::vector<KernelRadii> pooled(vertices_.size());
+    context_.workers().parallel_for(pooled.size(), 1024,
+                                    [&](std::size_t v) { pooled[v] = median_radii(vertices_, around[v]); });
     for (std::size_t v = 0; v < vertices_.size(); ++v) vertices_[v].radii = pooled[v];
   }
 
-  TriMesh estimate() {
-    std::vector<Color> irradiances(vertices_.size());
-    std::vector<std::uint8_t> is_buried(vertices_.size(), 0);
+  TriMesh estimate(const std::vector<std::vector<std::uint32_t>>& around) {
+    std::vector<SurfaceIrradiance> estimates(vertices_.size());
     context_.for_chunks(vertices_.size(), 64, [&](std::size_t begin, std::size_t end, Tracer&) {
       for (std::size_t i = begin; i < end; ++i) {
         const MeshVertex& v = vertices_[i];
-        if (sites_.is_site(static_cast<std::uint32_t>(i))) irradiances[i] = surfaces_[v.surface]->irradiance(v.around, v.radii);
+        if (sites_.is_site(static_cast<std::uint32_t>(i))) estimates[i] = surfaces_[v.surface]->irradiance(v.around, v.radii);
       }
     });
+    std::vector<Color> irradiances(vertices_.size());
+    context_.workers().parallel_for(irradiances.size(), 1024, [&](std::size_t i) {
+      irradiances[i] = steadied(static_cast<std::uint32_t>(i), vertices_, estimates, around[i]);
+    });
+    std::vector<std::uint8_t> is_buried(vertices_.size(), 0);
     context_.for_chunks(vertices_.size(), 64, [&](std::size_t begin, std::size_t end, Tracer& tracer) {
       for (std::size_t i = begin; i < end; ++i) {
         const MeshVertex& v = vertices_[i];

@@ -38,15 +38,18 @@ KernelRadii SurfaceDensity::radii(const Neighbourhood& around) const {
   return {{by[1].radius, by[0].radius}, mean_component(by[0].E + by[1].E), std::hypot(by[0].sigma, by[1].sigma)};
 }
 
-Color SurfaceDensity::irradiance(const Neighbourhood& around, const KernelRadii& radii) const {
-  if (even()) return even_irradiance_;
-  Color E(0);
+SurfaceIrradiance SurfaceDensity::irradiance(const Neighbourhood& around, const KernelRadii& radii) const {
+  if (even()) return {even_irradiance_};
+  SurfaceIrradiance result{.radius = radii.mean()};
   for (int half = 0; half < 2; ++half) {
     std::vector<NearPhoton> photons;
     half_[half].within(around, sqr(radii.half[half]), [&](const NearPhoton& photon) { photons.push_back(photon); });
-    E += local_linear(half_[half], photons, *area_, around, radii.half[half], sheet_).E;
+    const LinearEstimate e = local_linear(half_[half], photons, *area_, around, radii.half[half], sheet_);
+    result.E += e.E;
+    result.gradient += e.gradient;
+    result.sigma = std::hypot(result.sigma, e.sigma);
   }
-  return E;
+  return result;
 }
 
 }  // namespace ln

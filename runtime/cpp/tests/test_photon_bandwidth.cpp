@@ -117,6 +117,31 @@ TEST_CASE("the estimated standard error is that of the estimates") {
   CHECK(variance / kPoints == doctest::Approx(sum2 / kPoints - mean * mean).epsilon(4 * std::sqrt(2.0 / kPoints)));
 }
 
+TEST_CASE("the gradient of an estimate is that of linear light, at borders, too") {
+  const Floor floor([](double x) { return 3 + 2 * x / 0.7; }, 200'000);
+  constexpr float kRadius = 0.2f;
+  for (const float x : {-0.7f, -0.3f, 0.0f, 0.65f}) {
+    CAPTURE(x);
+    DVec3 sum(0), sum2(0);
+    constexpr int kPoints = 7;
+    for (int i = 0; i < kPoints; ++i) {
+      const Neighbourhood around{{x, 0.01f, 0.2f * static_cast<float>(i) - 0.6f}, {0, 1, 0}, true};
+      std::vector<NearPhoton> found;
+      floor.map.within(around, sqr(kRadius), [&](const NearPhoton& photon) { found.push_back(photon); });
+      const DVec3 gradient(local_linear(floor.map, found, floor.area, around, kRadius).gradient);
+      sum += gradient;
+      sum2 += gradient * gradient;
+    }
+    const DVec3 mean = sum / double(kPoints), error = glm::sqrt((sum2 / double(kPoints) - mean * mean) / double(kPoints - 1));
+    const double measuring = 0.01 * 2 / 0.7;  // of what a border leaves of the surface
+    CHECK(std::abs(mean.x - 2 / 0.7) < measuring + 4 * error.x);
+    CHECK(error.x < 0.1);
+    CHECK(mean.y == 0);
+    CHECK(std::abs(mean.z) < 4 * error.z);
+    CHECK(error.z < 0.1);
+  }
+}
+
 TEST_CASE("without photons it is dark; few photons do no harm") {
   for (const double photons_per_light : {0.0, 1.0, 10.0, 30.0}) {
     const Floor floor([](double) { return 2.0; }, photons_per_light);

@@ -3,6 +3,7 @@
 
 #include <cstring>
 
+#include "../src/mesh_sites.hpp"
 #include "ln/error.hpp"
 #include "ln/mesh_reduction.hpp"
 #include "ln/photon_mesh.hpp"
@@ -220,6 +221,59 @@ TEST_CASE("a plane under a directional light is evenly lit up to its border, in 
     CHECK(m.mean([](Vec2 u) { return Vec2(0.699f - 0.01f * u.x, 0.01f * u.y - 0.699f); }) ==
           doctest::Approx(truth).epsilon(0.15));
   }
+}
+
+TEST_CASE("a vertex with few photons takes what better neighbours say of it, unless its light is other light") {
+  const auto at = [](float x) { return MeshVertex{{{x, 0, 0}, {0, 1, 0}, true}, 0}; };
+  const MeshVertex vertices[] = {at(0), at(0.1f), at(0.2f), at(0.4f)};
+  SurfaceIrradiance irradiances[] = {{Color(2), 0.4f, Vec3(9), 0.05f},
+                                     {Color(3, 6, 0), 0.1f, Vec3(10, 0, 0), 0.3f},
+                                     {Color(6), 0.1f, Vec3(10, 0, 0), 0.3f},
+                                     {Color(7), 0.1f, Vec3(10, 0, 0), 0.3f}};
+  const std::uint32_t everything[] = {0, 1, 2, 3};
+  const auto first = [&] { return steadied(0, vertices, irradiances, everything); };
+  // The second says (3, 6, 0) * 2 / 3, with 16 times the weight; 6 - 2 is too much, 7 - 4 too far away.
+  const Color expected = (Color(2) + 16.0f * Color(2, 4, 0)) / 17.0f;
+  for (int k = 0; k < 3; ++k) CHECK(first()[k] == doctest::Approx(expected[k]));
+  CHECK(steadied(1, vertices, irradiances, everything) == Color(3, 6, 0));
+  irradiances[1].sigma = 0.3f;  // no better
+  CHECK(first() == Color(2));
+  irradiances[1].sigma = 0;  // unknown
+  CHECK(first() == Color(2));
+}
+
+TEST_CASE("light that falls off steeply does so up to borders and corners") {
+  SceneBuilder b;
+  add_floor(b);
+  const Vec3 lamp(0, 0.5f, 0);
+  PunctualLight light;
+  light.position = lamp;
+  light.intensity = Color(1);
+  b.data.lights.push_back(light);
+  const Meshed m(b.data, 300'000);
+  double sum2 = 0, most = 0;
+  int count = 0;
+  for (const MeshTriangle& t : m.mesh.triangles(Patches::face(0, true)))
+    for (std::size_t k = 0; k < 3; ++k, ++count) {
+      const SurfaceCell cell = m.mesh.patches().surface(0);
+      const Vec3 way = lamp - (cell.o + t.corner[k].x * cell.a + t.corner[k].y * cell.b);
+      const double truth = way.y / std::pow(glm::length(way), 3.0);
+      const double error = static_cast<double>(m.mesh.vertices()[t.vertex[k]].x) / truth - 1;
+      sum2 += error * error;
+      most = std::max(most, std::abs(error));
+    }
+  CHECK(std::sqrt(sum2 / count) < 0.04);
+  CHECK(most < 0.3);  // in a corner, whose kernels hold a quarter of the photons
+}
+
+TEST_CASE("hardly a vertex makes a speck in even light") {
+  SceneBuilder b;
+  b.box(Vec3(-0.5f, -0.4f, -0.3f), Vec3(0.5f, 0.4f, 0.3f), b.material(Color(0.5f), Color(1)));
+  const Meshed m(b.data, 1'000'000);
+  const float truth = 2 * kPi;
+  double specks = 0;
+  for (const Color& E : m.mesh.vertices()) specks += std::abs(E.x / truth - 1) > 0.1f ? 1 : 0;
+  CHECK(specks < 0.0035 * static_cast<double>(m.mesh.vertices().size()));  // 0.6 % by their own photons alone
 }
 
 TEST_CASE("the mesh has the energy of the photons") {

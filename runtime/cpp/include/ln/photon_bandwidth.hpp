@@ -17,14 +17,19 @@ struct LocalEstimate {
   float area = 0;    // its integral over the surface
 };
 
+/// An estimate that says how the irradiance goes on beside it.
+struct LinearEstimate : LocalEstimate {
+  Vec3 gradient{0};  // of the mean of E's channels along the surface [W/m^2 per normalised unit]
+};
+
 /// Weights c0 + c1 x + c2 y of places, besides the kernel's, with which what is linear comes out as it is: the solution of
 /// M c = (1, 0, 0) for the matrix M of moments.
 Vec3 linear_weights(const SurfaceMoments& m);
 
 /// The parabola over the photons within `radius`, weighted so that an irradiance that is linear over the surface comes out as
 /// it is (Walter et al. 1997; Ruppert and Wand 1994, eq. 2.2). `label`: of the triangles that the photons lie on.
-LocalEstimate local_linear(const PhotonMap& map, std::span<const NearPhoton> photons, const SurfaceArea& area,
-                           const Neighbourhood& around, float radius, std::uint32_t label = SurfaceArea::kEverything);
+LinearEstimate local_linear(const PhotonMap& map, std::span<const NearPhoton> photons, const SurfaceArea& area,
+                            const Neighbourhood& around, float radius, std::uint32_t label = SurfaceArea::kEverything);
 
 /// How wide kernels may be.
 struct KernelRange {

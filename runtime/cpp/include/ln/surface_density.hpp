@@ -14,6 +14,14 @@ struct KernelRadii {
   float mean() const { return 0.5f * (half[0] + half[1]); }
 };
 
+/// What the photons under a point's kernels say.
+struct SurfaceIrradiance {
+  Color E{0};        // [W/m^2]
+  float sigma = 0;   // standard error of the mean of the channels
+  Vec3 gradient{0};  // of that mean along the surface [W/m^2 per normalised unit]
+  float radius = 0;  // of the kernels, their mean
+};
+
 /// What is asked of the kernels on each surface.
 struct SurfaceKernels {
   int least = 25, most = 6400;  // photons under the narrowest and the widest
@@ -33,8 +41,7 @@ class SurfaceDensity {
   /// Are there too few photons for kernels?
   bool even() const { return half_[0].empty(); }
 
-  /// Irradiance [W/m^2].
-  Color irradiance(const Neighbourhood& around, const KernelRadii& radii) const;
+  SurfaceIrradiance irradiance(const Neighbourhood& around, const KernelRadii& radii) const;
 
  private:
   const SurfaceArea* area_;

@@ -11,8 +11,10 @@ namespace {
 /// Photons nearer than this [normalised units] are at one place.
 constexpr float kMinRadius = 1e-6f;
 
-/// A stored estimate is taken for points up to so many radii of its kernel away.
+/// A stored estimate is taken for points up to so many radii of its kernel away. Of the nearest ones, that which is the least
+/// part of its radius away: by distance alone, bright ones, which are dense, would reach beyond the edges of their light.
 constexpr float kReach = 0.5f;
+constexpr std::size_t kCandidates = 2;
 
 struct Found {
   NearPhoton photons[PhotonMap::capacity(PhotonDensity::kMaxNeighbours)];
@@ -59,11 +61,18 @@ void PhotonDensity::store(PrepareContext& context, std::size_t every) {
 PhotonDensity::Estimate PhotonDensity::estimate(const Neighbourhood& around) const {
   if (!map_ || map_->empty()) return {};
   if (!stored_.empty()) {
-    NearPhoton nearest[PhotonMap::capacity(1)];
-    if (stored_places_.nearest(around, sqr(kReach * max_radius_), 1, nearest) > 0) {
-      const Estimate& stored = stored_[nearest[0].slot];
-      if (nearest[0].distance2 < sqr(kReach * stored.radius)) return stored;
+    NearPhoton near[PhotonMap::capacity(kCandidates)];
+    const std::size_t found = stored_places_.nearest(around, sqr(kReach * max_radius_), kCandidates, near);
+    const Estimate* best = nullptr;
+    float least = sqr(kReach);
+    for (std::size_t i = 0; i < found; ++i) {
+      const Estimate& stored = stored_[near[i].slot];
+      const float away = near[i].distance2 / sqr(stored.radius);
+      if (!(away < least)) continue;
+      least = away;
+      best = &stored;
     }
+    if (best) return *best;
   }
   return estimate_from(*map_, around);
 }

@@ -197,3 +197,17 @@ TEST_CASE("without photons it is dark; few photons do no harm") {
     CHECK(min_component(E) >= 0);
   }
 }
+
+TEST_CASE("estimates beforehand hardly blur an edge of light more than kernels do") {
+  // A plate puts half of the floor into the shade of one of two lights: 4 beside 1.
+  SceneBuilder b;
+  add_floor(b);
+  b.quad({0, 0.3f, 0.7f}, {0, 0.3f, -0.7f}, {-0.7f, 0.3f, -0.7f}, {-0.7f, 0.3f, 0.7f}, b.material(Color(0)));
+  b.directional({0, -1, 0}, Color(3));
+  b.directional({-1, -1, 0}, Color(std::sqrt(2.0f)));
+  const auto mean = [&](int every) {
+    return Estimate(b.data, 400'000, 60, PhotonKernel::cone, path_automaton<EmptyPath>(), every)
+        .mean([](Vec2 u) { return Vec3(-0.02f * u.x, 0.01f, u.y - 0.5f); }, kUp);
+  };
+  CHECK(mean(4) - mean(0) < 0.14);  // 0.17 by the nearest one alone
+}

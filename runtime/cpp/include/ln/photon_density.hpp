@@ -19,7 +19,7 @@ class PhotonDensity {
     Color E{0};        // irradiance [W/m^2]
     float radius = 0;  // of the kernel [normalised units]
   };
-  /// At a point, or at the nearest photon that has one, if that is near.
+  /// At a point, or at a photon nearby that has one.
   Estimate estimate(const Neighbourhood& around) const;
 
   float max_radius() const { return max_radius_; }

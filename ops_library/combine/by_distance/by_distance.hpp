@@ -1,6 +1,9 @@
 #pragma once
 
+#include <atomic>
+
 #include "ln/operator.hpp"
+#include "ln/progress.hpp"
 
 namespace ln::ops {
 
@@ -16,7 +19,17 @@ struct ByDistance {
     const auto unit = static_cast<float>(request.tracer().scene().data().unit);
     if (diffuse.distance() * unit < distance) return near(diffuse);
     const Color answer = far(diffuse);
+    if (radii > 0 && distance == 0 && diffuse.blur() == 0 && diffuse.distance() < kInfinity && !is_black(answer)) warn();
     return diffuse.distance() < radii * diffuse.blur() ? near(diffuse) : answer;
+  }
+
+  /// Once in a run.
+  LN_NOINLINE static void warn() {
+    static std::atomic<bool> is_said = false;
+    if (is_said.load(std::memory_order_relaxed) || is_said.exchange(true)) return;
+    warning(
+        "ByDistance: 'far' is no mean over a radius (NNDensity and LepskiDensity are), so no ray is short and 'near' is not "
+        "used: give it a 'distance'");
   }
 };
 

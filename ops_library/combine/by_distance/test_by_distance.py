@@ -84,3 +84,25 @@ def test_contact(probe):
     truth, of_truth = found["traced"]
     assert abs(lux - truth) < 4 * math.hypot(error, of_truth) < truth / 8
     assert found["blurred"][0] > 2 * truth
+
+
+@pytest.mark.parametrize(
+    ("far", "warns"),
+    [("direct", True), ("direct, distance = 1cm", False), ("direct, radii = 0", False), ("density", False)],
+)
+def test_a_warning_where_no_ray_is_ever_short(compiled_network, run_program, far, warns):
+    source, *parameters = far.split(", ")
+    text = "\n".join(
+        [
+            "network silent",
+            "light = Lights()",
+            "direct = Direct(light)",
+            "density = NNDensity(ParticleTracer(light, count = 1k, via = ()))",
+            f"image Gather(ByDistance({', '.join([source, 'direct', *parameters])}))",
+        ]
+    )
+    program = compiled_network("silent", text=text)
+    run = run_program(program, EXAMPLES / "scenes" / "cornell_box.gltf", "--samples", "1", "--size", "32x24")
+    assert run.status == 0, run.stderr
+    assert run.stderr.count("ByDistance: 'far' is no mean over a radius") == (1 if warns else 0)
+    assert not warns or "give it a 'distance'" in run.stderr

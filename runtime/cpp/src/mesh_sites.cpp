@@ -102,9 +102,10 @@ Color steadied(std::uint32_t v, std::span<const MeshVertex> vertices, std::span<
   float weights = 1;
   for (const std::uint32_t w : neighbours) {
     const SurfaceIrradiance& other = irradiances[w];
+    const float radius = vertices[w].radii.mean();
     const Vec3 way = vertices[v].around.point - vertices[w].around.point;
-    if (!(own.radius < kNarrow * other.radius && other.sigma > 0 && other.sigma < kMuchBetter * own.sigma)) continue;
-    if (glm::length(way) > other.radius) continue;
+    if (!(vertices[v].radii.mean() < kNarrow * radius && glm::length(way) < radius)) continue;
+    if (!(other.sigma > 0 && other.sigma < kMuchBetter * own.sigma)) continue;
     const float there = mean_component(other.E), here = there + glm::dot(other.gradient, way);
     if (!(there > 0 && here > 0 && std::abs(here - mean_component(own.E)) < kAgreement * own.sigma)) continue;
     const float weight = sqr(own.sigma / other.sigma);

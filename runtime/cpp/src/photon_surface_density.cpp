@@ -40,7 +40,7 @@ KernelRadii SurfaceDensity::radii(const Neighbourhood& around) const {
 
 SurfaceIrradiance SurfaceDensity::irradiance(const Neighbourhood& around, const KernelRadii& radii) const {
   if (even()) return {even_irradiance_};
-  SurfaceIrradiance result{.radius = radii.mean()};
+  SurfaceIrradiance result;
   for (int half = 0; half < 2; ++half) {
     std::vector<NearPhoton> photons;
     half_[half].within(around, sqr(radii.half[half]), [&](const NearPhoton& photon) { photons.push_back(photon); });

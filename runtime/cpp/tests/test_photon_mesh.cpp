@@ -224,12 +224,12 @@ TEST_CASE("a plane under a directional light is evenly lit up to its border, in 
 }
 
 TEST_CASE("a vertex with few photons takes what better neighbours say of it, unless its light is other light") {
-  const auto at = [](float x) { return MeshVertex{{{x, 0, 0}, {0, 1, 0}, true}, 0}; };
-  const MeshVertex vertices[] = {at(0), at(0.1f), at(0.2f), at(0.4f)};
-  SurfaceIrradiance irradiances[] = {{Color(2), 0.4f, Vec3(9), 0.05f},
-                                     {Color(3, 6, 0), 0.1f, Vec3(10, 0, 0), 0.3f},
-                                     {Color(6), 0.1f, Vec3(10, 0, 0), 0.3f},
-                                     {Color(7), 0.1f, Vec3(10, 0, 0), 0.3f}};
+  const auto at = [](float x, float radius) { return MeshVertex{{{x, 0, 0}, {0, 1, 0}, true}, 0, {{radius, radius}}}; };
+  MeshVertex vertices[] = {at(0, 0.05f), at(0.1f, 0.3f), at(0.2f, 0.3f), at(0.4f, 0.3f)};
+  SurfaceIrradiance irradiances[] = {{Color(2), 0.4f, Vec3(9)},
+                                     {Color(3, 6, 0), 0.1f, Vec3(10, 0, 0)},
+                                     {Color(6), 0.1f, Vec3(10, 0, 0)},
+                                     {Color(7), 0.1f, Vec3(10, 0, 0)}};
   const std::uint32_t everything[] = {0, 1, 2, 3};
   const auto first = [&] { return steadied(0, vertices, irradiances, everything); };
   // The second says (3, 6, 0) * 2 / 3, with 16 times the weight; 6 - 2 is too much, 7 - 4 too far away.
@@ -239,6 +239,9 @@ TEST_CASE("a vertex with few photons takes what better neighbours say of it, unl
   irradiances[1].sigma = 0.3f;  // no better
   CHECK(first() == Color(2));
   irradiances[1].sigma = 0;  // unknown
+  CHECK(first() == Color(2));
+  irradiances[1].sigma = 0.1f;
+  vertices[0].radii = vertices[1].radii;  // as wide, as at a border
   CHECK(first() == Color(2));
 }
 

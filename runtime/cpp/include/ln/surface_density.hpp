@@ -19,7 +19,6 @@ struct SurfaceIrradiance {
   Color E{0};        // [W/m^2]
   float sigma = 0;   // standard error of the mean of the channels
   Vec3 gradient{0};  // of that mean along the surface [W/m^2 per normalised unit]
-  float radius = 0;  // of the kernels, their mean
 };
 
 /// What is asked of the kernels on each surface.
